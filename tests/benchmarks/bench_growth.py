@@ -1,30 +1,40 @@
-"""What processor time grows with: one design evaluated, unbalances decided, stars searched, stiffness decided.
+"""What time and memory grow with: one design evaluated, unbalances decided, stars searched, stiffness decided.
 
-Writes results/benchmarks/growth.md. Each size is one solve of a process of its own kind; exponents are fitted
-to the larger half of the sizes. `--quick` takes the smaller half.
+Writes results/benchmarks/growth.md. Each size runs in a forked process of its own, whose largest memory is read;
+exponents are fitted to the larger half of the sizes. `--quick` takes the smaller half.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import multiprocessing
 import os
+import resource
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
+from multiprocessing.connection import wait
 from typing import Any
 
 import numpy as np
-from pages import PAGES, publish
+from pages import PAGES, ROOT, publish
 
-from laufruhe import load, solve
+from laufruhe import evaluate_many, load, solve
 from laufruhe.physics.shaking_loads import forget
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.solvers.prices import angle_name
 
 OUT = PAGES / "growth.md"
 # an evaluation is repeated for so long [s], and the least of so many rounds is taken
 LONG_ENOUGH, ROUNDS = 0.03, 5
 ELASTIC_SPRINGS = 6
+MEGABYTE = 1e6
+# a forked process touches some 10 MB whatever it does, so less than this says nothing about growth [MB]
+NOISE = 14.0
+# designs that are evaluated in one call, in two sizes
+FEW, MANY = 20_000, 200_000
 
 
 def scene(
@@ -70,6 +80,12 @@ def star(cylinders: int) -> dict[str, Any]:
         "title": "star", "engine": engine, "operating_points": points, "phasing": {"best": 8},
         "objective": {"minimise": "rms rocking couple", "orders": [1, 2]},
     }  # fmt: skip
+
+
+def two_stroke_star(cylinders: int) -> dict[str, Any]:
+    """Crank of a two-stroke open: each throw on a step of its own, so that some couple is left."""
+    tables = star(cylinders)
+    return {**tables, "engine": {**tables["engine"], "cycle": "two-stroke"}, "phasing": {"best": 1}}
 
 
 def crank(cylinders: int, gas: bool) -> dict[str, Any]:
@@ -143,6 +159,43 @@ def proven(tables: dict[str, Any]) -> tuple[float, str]:
     return took, f"{proof.kind}, gap {proof.gap:.0e}" if proof.gap else f"{proof.kind}"
 
 
+def apart(works: Sequence[Callable[[], Any]]) -> list[tuple[Any, float]]:
+    """Return the answers of works, each in a forked process on one processor, and the memory that each added [MB]."""
+    context, free = multiprocessing.get_context("fork"), sorted(os.sched_getaffinity(0))
+    answers: list[Any] = [None] * len(works)
+    running: dict[Any, tuple[int, int, Any]] = {}
+    for number, work in enumerate(works):
+        receiver, sender = context.Pipe(duplex=False)
+        if not free:
+            _receive(running, answers, free)
+        cpu = free.pop()
+        process = context.Process(target=_child, args=(work, cpu, sender))
+        process.start()
+        sender.close()
+        running[receiver] = number, cpu, process
+    while running:
+        _receive(running, answers, free)
+    return answers
+
+
+def _child(work: Callable[[], Any], cpu: int, sender: Any) -> None:
+    # one processor: what is measured is work, not how it is shared
+    os.sched_setaffinity(0, {cpu})
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    answer = work()
+    added = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    sender.send((answer, 1024.0 * added / MEGABYTE))
+
+
+def _receive(running: dict[Any, tuple[int, int, Any]], answers: list[Any], free: list[int]) -> None:
+    for receiver in wait(list(running)):
+        number, cpu, process = running.pop(receiver)
+        answers[number] = receiver.recv()
+        process.join()
+        free.append(cpu)
+        print(f"{sum(answer is not None for answer in answers)} of {len(answers)}", flush=True)
+
+
 @dataclass(frozen=True)
 class Sweep:
     """What grows with what."""
@@ -153,6 +206,21 @@ class Sweep:
     tables: Callable[[int], dict[str, Any]]
     measured: Callable[[dict[str, Any]], float]
     grows_by_factor: bool = False
+
+    def works(self, quick: bool) -> list[Callable[[], float]]:
+        """Return what is to be done for each size; `quick` leaves the larger half out."""
+        sizes = self.sizes[: (len(self.sizes) + 1) // 2 + 1] if quick else self.sizes
+        return [lambda n=n: self.measured(self.tables(n)) for n in sizes]
+
+    def row(self, answers: Sequence[tuple[float, float]]) -> str:
+        """Return times and memory of the sizes, with their exponents."""
+        sizes, fitted = self.sizes[: len(answers)], factor if self.grows_by_factor else exponent
+        times, memory = [seconds for seconds, _ in answers], [added for _, added in answers]
+        sign = "x " if self.grows_by_factor else ""
+        grows = f"{sign}{fitted(sizes, memory):.2f}" if min(memory[len(memory) // 2 :]) >= NOISE else ""
+        cells = (", ".join(map(str, sizes)), ", ".join(map(told, times)), f"{sign}{fitted(sizes, times):.2f}",
+                 ", ".join(f"{added:.0f}" for added in memory), grows)  # fmt: skip
+        return f"| {self.what} | {self.by} | {' | '.join(cells)} |"
 
 
 SWEEPS = (
@@ -170,6 +238,7 @@ SWEEPS = (
     Sweep("solve unbalances", "shafts", (2, 6, 16, 50), lambda n: scene(shafts=n), solved),
     Sweep("solve unbalances", "counterweights", (2, 6, 16, 50), lambda n: scene(shafts=0, counterweights=n), solved),
     Sweep("search stars", "cylinders", (4, 5, 6, 7, 8, 9, 10, 12), star, solved, True),
+    Sweep("search stars, two-stroke", "throws", (11, 12, 13, 14, 16, 17), two_stroke_star, solved, True),
     Sweep("decide stiffness", "springs", (1, 2, 4, 6, 9, 12), elastic, solved),
     Sweep("decide stiffness", "operating points", (1, 2, 4, 8, 16), lambda n: elastic(ELASTIC_SPRINGS, n), solved),
 )  # fmt: skip
@@ -186,6 +255,39 @@ LARGE = (
     ("48 cylinders, six springs open", lambda: elastic(ELASTIC_SPRINGS, cylinders=48)),
     ("4 cylinders, six springs open, 100 points", lambda: elastic(ELASTIC_SPRINGS, 100)),
 )
+
+
+def one_cylinder() -> dict[str, Any]:
+    """A single-cylinder at 144 samples."""
+    return scene(1, shafts=1, samples=144)
+
+
+DESIGNS = (
+    ("single-cylinder, one shaft open, 144 samples", one_cylinder),
+    ("`problems/tractor-four-lanchester.toml`", lambda: ROOT / "problems" / "tractor-four-lanchester.toml"),
+    ("4 cylinders, two shafts open, 10 points", lambda: scene(points=10)),
+    ("12 cylinders, 50 unbalances open, one point", lambda: scene(12, shafts=0, counterweights=50)),
+)
+
+
+def many_designs(source: Any, count: int) -> float:
+    """Seconds of so many designs with random unbalances, evaluated in one call; each design has the whole circle."""
+    problem, random = load(source), np.random.default_rng(1)
+    designs = {decision.name: random.uniform(decision.lower, decision.upper, count) for decision in problem.decisions}
+    designs |= {angle_name(decision): random.uniform(0.0, math.tau, count) for decision in problem.decisions}
+    began = time.process_time()
+    table = evaluate_many(problem, designs)
+    took = time.process_time() - began
+    assert np.isfinite(table["objective"]).all()
+    return took
+
+
+def designs_row(name: str, answers: Sequence[tuple[float, float]]) -> str:
+    """Return time and memory of one more design by two sizes, and of a thousand million by extrapolation."""
+    (few, few_memory), (many, many_memory) = answers
+    each, size = (many - few) / (MANY - FEW), MEGABYTE * (many_memory - few_memory) / (MANY - FEW)
+    return (f"| {name} | {told(few)} | {told(many)} | {1e6 * each:.2g} µs | {size:.0f} B "
+            f"| {1e9 * each / 3600.0:.2g} h | {size:,.0f} GB |")  # fmt: skip
 
 
 def exponent(sizes: Sequence[int], times: Sequence[float]) -> float:
@@ -211,38 +313,44 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
     quick = parser.parse_args().quick
-    if hasattr(os, "sched_setaffinity"):
-        # one processor: what is measured is work, not how it is shared
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     for tables in (scene(), star(4), elastic(2)):
         # libraries are loaded before the clock starts
         solved(tables)
     lines = [
         "# What cost grows with",
         "",
-        "Processor time of one process; libraries are loaded before. Rows of cylinders without gas on four rigid",
-        "mounts, two shafts of open size and angle, unless the column says otherwise; stars by the rms rocking",
-        "couple; stiffness on elastic mounts with gas, and six springs where points grow. Exponents are fitted to the",
-        "larger half of the sizes; of stars the factor for each further cylinder.",
+        "Processor time, and memory that the work added to its process, each size in a process of its own; libraries",
+        "are loaded before. Rows of cylinders without gas on four rigid mounts, two shafts of open size and angle,",
+        "unless the column says otherwise; stars by the rms rocking couple; stiffness on elastic mounts with gas, and",
+        "six springs where points grow. Exponents are fitted to the larger half of the sizes; of stars the factor for",
+        "each further cylinder or throw. A process adds some 10 MB whatever it does;",
+        f"under {NOISE:.0f} MB there is no exponent.",
         "",
-        "| what | grows with | sizes | processor time | exponent |",
-        "| --- | --- | --- | --- | ---: |",
+        "| what | grows with | sizes | processor time | exponent | memory [MB] | exponent |",
+        "| --- | --- | --- | --- | ---: | --- | ---: |",
     ]
-    for sweep in SWEEPS:
-        sizes = sweep.sizes[: (len(sweep.sizes) + 1) // 2 + 1] if quick else sweep.sizes
-        times = [sweep.measured(sweep.tables(n)) for n in sizes]
-        power = f"x {factor(sizes, times):.2f}" if sweep.grows_by_factor else f"{exponent(sizes, times):.2f}"
-        lines.append(
-            f"| {sweep.what} | {sweep.by} | {', '.join(map(str, sizes))} | {', '.join(map(told, times))} | {power} |"
-        )
-        print(lines[-1], flush=True)
-    lines += ["", "## What to expect of large problems", "", "| problem | evaluate | solve | what is proven |"]
-    lines.append("| --- | ---: | ---: | --- |")
-    for name, make in () if quick else LARGE:
-        tables = make()
-        took, proof = proven(tables)
-        lines.append(f"| {name} | {told(evaluated(tables))} | {told(took)} | {proof} |")
-        print(lines[-1], flush=True)
+    large, designs = () if quick else LARGE, DESIGNS[:1] if quick else DESIGNS
+    works: list[list[Callable[[], Any]]] = [sweep.works(quick) for sweep in SWEEPS]
+    works += [[lambda make=make: evaluated(make()), lambda make=make: proven(make())] for _, make in large]
+    works += [[lambda make=make, n=n: many_designs(make(), n) for n in (FEW, MANY)] for _, make in designs]
+    flat = iter(apart(list(chain(*works))))
+    answers = [[next(flat) for _ in group] for group in works]
+    lines += [sweep.row(answer) for sweep, answer in zip(SWEEPS, answers, strict=False)]
+    lines += ["", "## What to expect of large problems", ""]
+    lines += ["| problem | evaluate | solve | memory [MB] | what is proven |", "| --- | ---: | ---: | ---: | --- |"]
+    for (name, _), ((seconds, _), ((took, proof), added)) in zip(large, answers[len(SWEEPS) :], strict=False):
+        lines.append(f"| {name} | {told(seconds)} | {told(took)} | {added:.0f} | {proof} |")
+    lines += ["", "## A thousand million designs, by extrapolation", ""]
+    lines += [
+        f"`laufruhe.evaluate_many` was run with {FEW:,} and {MANY:,} designs of random unbalances. The difference is",
+        "the cost of one more design, and a thousand million times that the last two columns: of one core, and of one",
+        "table with all designs. Pieces of a million designs need a thousandth of that memory.",
+        "",
+        f"| problem | {FEW:,} | {MANY:,} | one more | memory of one more | 1e9: one core | 1e9: memory |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for (name, _), answer in zip(designs, answers[len(SWEEPS) + len(large) :], strict=True):
+        lines.append(designs_row(name, answer))
     publish(OUT, "\n".join(lines) + "\n")
 
 

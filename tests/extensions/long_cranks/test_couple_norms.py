@@ -76,9 +76,8 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
     assert low.max() <= own.upper_bound(family.space)
     for maximum in np.quantile(exact, (0.0, 0.1, 0.5, 0.9)):
         window = own.window(family.space, family.space.patterns[0], maximum)
-        couples = star_sums(stars, family.space.phases, family.space.places, (window.order,))[:, 0, 1]
-        inside = (np.abs(couples.real) <= window.high.real) & (np.abs(couples.imag) <= window.high.imag)
-        assert inside[exact <= maximum].all()
+        couples = np.abs(star_sums(stars, family.space.phases, family.space.places, window.orders)[:, :, 1])
+        assert (couples <= window.reaches)[exact <= maximum].all()
         # those over a value may be told by less, never under it
         told = own.values(family.space, stars, maximum)
         assert told[low <= maximum] == pytest.approx(low[low <= maximum], rel=1e-12)

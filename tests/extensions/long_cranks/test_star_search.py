@@ -96,6 +96,19 @@ def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
         assert {tuple(star) for star in space.canonical(every[inside])} <= found
 
 
+@pytest.mark.parametrize("name", OBJECTIVES)
+def test_no_star_below_a_value_is_left_out(name):
+    """Half of all 720 stars are below the median, and all of them meet in its window."""
+    space, objective = replace(whole(7), mirror=False, reflect=False), OBJECTIVES[name]
+    every = np.array([(0, *rest) for rest in itertools.permutations(range(1, 7))], dtype=np.uint8)
+    values = objective.values(space, every)
+    median, free = float(np.median(values)), Free.from_pattern(space.patterns[0])
+    window = objective.window(space, space.patterns[0], median)
+    blocks = [block for own in shares_of(space, free) for block in meeting(space, free, own, window)]
+    found = {tuple(star) for block in blocks for star in space.canonical(block)}
+    assert {tuple(star) for star in every[values < median * (1.0 - 1e-9)]} <= found
+
+
 @settings(max_examples=12)
 @given(st.integers(0, 10**6), st.sampled_from([(1,), (2,), (1, 2), (2, 3)]), st.floats(-4.0, 1.0))
 def test_rearranged_throws_meet_in_every_star_of_a_window_and_no_other(seed, orders, width):

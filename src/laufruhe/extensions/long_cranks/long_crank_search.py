@@ -62,7 +62,8 @@ def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     for family, objective in simple:
         space = replace(family.space, mirror=True, reflect=True)
         if phasing.method is Method.ENUMERATION:
-            stars, method = enumerate_stars(space, objective, phasing.best, phasing.time_limit), "every star looked at"
+            stars = enumerate_stars(space, objective, phasing.best, phasing.time_limit)
+            method = "stars evaluated one by one"
         else:
             stars, method = search_stars(space, objective, phasing.best, phasing.time_limit), _BY_HALVES
         answers.append(enumeration_result(phasing, family, stars, method))

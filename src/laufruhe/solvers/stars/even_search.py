@@ -131,7 +131,7 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         model = family.model(phasing)
         pairs = PairObjective.from_problem(model.at(model.samples))
         search = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
-        result = enumeration_result(phasing, family, search, "all firing orders evaluated by pairs of throws")
+        result = enumeration_result(phasing, family, search, "firing orders evaluated by pairs of throws")
         return replace(result, infeasible=0 if result.designs else search.nodes)
     objectives = [objective for family in families if (objective := amplitudes(phasing, family)) is not None]
     if len(objectives) < len(families):
@@ -140,7 +140,7 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     for family, objective in zip(families, objectives, strict=True):
         space = replace(family.space, mirror=True, reflect=True)
         search = enumerate_stars(space, objective, phasing.best, phasing.time_limit)
-        results.append(enumeration_result(phasing, family, search, "all stars evaluated"))
+        results.append(enumeration_result(phasing, family, search, "stars evaluated one by one"))
     return merge_results(results, phasing.best)
 
 
@@ -162,6 +162,8 @@ def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
 
 def enumeration_result(phasing: Phasing, family: Family, search: StarSearchResult, method: str) -> EvenStarResult:
     """Return the result of an enumeration of crank stars; `method` is its name for the certificate."""
+    if not search.complete:
+        method = f"{method}, not all in the time"
     designs = tuple(
         EvenDesign(phasing, family, tuple(map(int, star)), (), float(value), float(value), search.complete)
         for star, value in zip(search.stars, search.values, strict=True)
