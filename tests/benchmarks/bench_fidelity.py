@@ -141,7 +141,7 @@ def pruned() -> list[str]:
         own = replace(problem, fidelity=Fidelity(samples=720))
         whole, less = prepare(own, prune=False), prepare(own)
         values = random_decisions(own, 2000)
-        size = [sum(n.rows.shape[0] * n.rows.shape[2] for _, n in d.terms) for d in (whole, less)]
+        size = [sum(n.rows.shape[0] * n.rows.shape[2] for n in d.norms.values()) for d in (whole, less)]
         times = [seconds(lambda d=d, v=values: d.objective(v)) for d in (whole, less)]
         assert np.allclose(whole.objective(values[:50]), less.objective(values[:50]), rtol=1e-11)
         lines.append(f"| {name} | {size[0]} / {size[1]} | {size[0] / size[1]:.1f} | {times[0] / times[1]:.1f} |")
