@@ -103,11 +103,12 @@ class Mean(Norm):
         return float(shares @ np.sqrt(squares).mean(axis=1))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return the change of the mean to fine samples, plus the spread of its three thirds (F7)."""
-        times, total = 3 * max(1, finest // (3 * steps)), 0.0
+        """Return the change of the mean to fine samples, plus the spreads of its halves and thirds (F7)."""
+        times, total = 6 * max(1, finest // (6 * steps)), 0.0
         for signal, share in zip(signals, shares, strict=True):
             if share > 0.0:
-                thirds = fine_lengths(signal, steps, times)[0].reshape(-1, 3, signal.coefficients.shape[1]).mean((0, 2))
+                sixths = fine_lengths(signal, steps, times)[0].reshape(-1, 6, signal.coefficients.shape[1]).mean((0, 2))
+                halves, thirds = sixths.reshape(3, 2).mean(axis=0), sixths.reshape(2, 3).mean(axis=0)
                 sampled = lengths(signal.series.sample(steps)).mean()
-                total += share * float(abs(sampled - thirds.mean()) + np.ptp(thirds))
+                total += share * float(abs(sampled - sixths.mean()) + np.ptp(halves) + np.ptp(thirds))
         return total
