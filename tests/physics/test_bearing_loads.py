@@ -181,7 +181,7 @@ def test_one_bearing_does_not_carry_a_throw() -> None:
 
 
 def test_uneven_speed_is_refused() -> None:
-    with pytest.raises(ModelError, match="even crank speed"):
+    with pytest.raises(ModelError, match="constant crank speed"):
         pin_forces(engine_of(0), POINT, Fidelity(crank_inertia=1.0))
 
 

@@ -23,7 +23,7 @@ from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, lower_bound
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.cones import conic
+from laufruhe.solvers.cones import conic, newton
 from laufruhe.solvers.cones.cone_program import SparseMatrix
 from laufruhe.solvers.cones.conic import TIGHT, solve_cones
 from problem_files import PROBLEMS, loaded
@@ -130,6 +130,7 @@ def test_the_size_of_the_weights_changes_nothing(factor: float, tmp_path: Path) 
 @pytest.mark.parametrize("share", [0.3, 0.7, 1.0])
 def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same optimum and price of the limit, and a bound that holds on every angle."""
+    monkeypatch.setattr(conic, "newton_solution", lambda _: None)
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     peak = replace(problem.objective[0].measure, norm=NORMS["maximum"])
     free = AffineModel(problem).at(480)
@@ -180,11 +181,12 @@ def test_a_solver_that_gives_up_is_not_the_end(status: str, monkeypatch: pytest.
     """A design is left, no worse than the one given, with the bound that holds; nothing is called impossible."""
     word, value = STOPPED[status]
 
-    def told(rows: Any, cost: Any, settings: Any) -> Any:
+    def told(rows: Any, cost: Any, *_: Any) -> Any:
         x, z = np.full(rows.columns, value), np.full(rows.count, value)
         return SimpleNamespace(status=word, x=x, z=z, solve_time=0.0, iterations=1)
 
     monkeypatch.setattr(conic, "run_clarabel", told)
+    monkeypatch.setattr(newton, "run_clarabel", told)
     result = solve(limited(0.5))
     assert result.status is Status.FEASIBLE
     assert result.objective is not None

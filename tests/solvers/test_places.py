@@ -360,7 +360,7 @@ def test_distances_that_no_place_keeps(tmp_path: Path) -> None:
 
 def test_distances_of_what_is_not_there_are_refused(tmp_path: Path) -> None:
     for limit, said in (
-        ('limit = "shaft distance"\nmin = "1 mm"', "there are none"),
+        ('limit = "shaft distance"\nmin = "1 mm"', "needs balancer shafts"),
         ('limit = "shaft distance"\nof = ["nothing"]\nmin = "1 mm"', "no shaft here"),
     ):
         with pytest.raises(InputError, match=said):

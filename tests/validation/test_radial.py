@@ -404,7 +404,7 @@ def test_an_open_order_is_the_one_that_is_nearest_to_even(tmp_path: Path) -> Non
     ("old", "new", "message"),
     [
         ('knuckle_radius = "50 mm"', "", "engine.knuckle_radius: is missing; add it, 0 mm puts all rods"),
-        ("cylinders = 5", "cylinders = 5\nmaster_cylinder = 6", 'engine.master_cylinder = "6": is none of 5'),
+        ("cylinders = 5", "cylinders = 5\nmaster_cylinder = 6", 'engine.master_cylinder = "6": is not one of the 5'),
         ("cylinders = 5", "cylinders = 5\nknuckle_angles = [72]", "engine.knuckle_angles: has 1 angle"),
         ('rod_length = "210 mm"', "rod_ratio = 0", "engine.rod"),
         ("cylinders = 5", 'cylinders = 5\ncylinder_spacing = "1 m"', "engine.cylinder_spacing: means nothing"),

@@ -30,8 +30,6 @@ MAX_STEPS = 15
 """Largest number of Newton steps."""
 SHARES = (1.0, 0.5, 0.25, 0.1, 0.03)
 """Shares of a step that are tried until the objective falls."""
-NO_STEP = 1e-9
-"""Step relative to a decision's scale that counts as zero if the decision is zero."""
 TARGET, PROVEN = 1e-9, 1e-8
 """Relative gap at which the steps end, and largest gap of an optimum that needs no cone program."""
 FEW_ROWS = 64
@@ -126,7 +124,7 @@ class NewtonProgram:
         directions
             Directions in which the smooth terms have to be curved, shape (n, m); without curvature the result is None.
         """
-        problem, is_zero, end, last = self.problem, x == 0.0, None, math.inf
+        problem, end, last = self.problem, None, math.inf
         cones = self.no_cones
         for _ in range(MAX_STEPS):
             gradient, curvature = self.derivatives(x)
@@ -155,8 +153,7 @@ class NewtonProgram:
                 break
             # without a fall of the objective, dual rows have to improve
             last = WORTHWHILE * improvement if fall <= ROUNDING * value else math.inf
-            x = np.where(is_zero & (np.abs(y) <= NO_STEP * problem.scales), 0.0, y)
-            end = x, cones
+            x, end = y, (y, cones)
         return None if end is None else (end[0], self.multipliers(*end))
 
     @property

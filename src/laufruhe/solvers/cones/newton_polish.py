@@ -12,6 +12,7 @@ from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, flatten_interior, gap_of, lower_bound
 from laufruhe.solvers.cones.newton import FEW_ROWS, NewtonProgram
+from laufruhe.solvers.cones.tie_break import drop_negligible
 
 TARGET_GAP = 1e-6
 """Gap below which an optimum is not refined."""
@@ -76,7 +77,7 @@ def polish(model: AffineModel, coarse: Optimum, samples: int) -> Optimum:
     step = None if program is None else program.steps(coarse.x)
     if step is None:
         return coarse
-    x, multipliers = step
+    x, multipliers = drop_negligible(fine, step[0]), step[1]
     averaged = model.at(samples, averaged=True)
     bound = lower_bound(averaged, multipliers)
     value = fine.objective(x)

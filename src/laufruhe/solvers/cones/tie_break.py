@@ -25,7 +25,7 @@ def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
     directions = _free_directions(problem, affine)
     if directions.shape[1]:
         x = _minimise_mass(affine, x, directions)
-    return _cancel_exactly(affine, _drop_negligible(affine, x))
+    return _cancel_exactly(affine, drop_negligible(affine, x))
 
 
 def _free_directions(problem: Problem, affine: AffineProblem) -> Array:
@@ -91,7 +91,7 @@ def distance(domain: Domain, target: Array, columns: int) -> AffineNorm:
     return AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1))
 
 
-def _drop_negligible(affine: AffineProblem, x: Array) -> Array:
+def drop_negligible(affine: AffineProblem, x: Array) -> Array:
     """Return x with those unbalances set to zero that have a negligible load, or do not lower the objective.
 
     The test compares loads and not bounds, which may be a million times too wide.
