@@ -368,6 +368,10 @@ class TestIntervals:
     @pytest.mark.parametrize(
         ("keys", "line"),
         [
+            (
+                {"firing_intervals": [60, 660], "throws": None},
+                "cylinder 2 needs its throw at 270 deg, cylinder 1 on the same throw at 30 deg; correct the intervals",
+            ),
             ({"firing_intervals": [60, 660]}, "its dead centre is 300 or 660 deg after it"),
             ({"firing_intervals": [300, 300]}, "adds up to 600 deg; give intervals that make the 720 deg of a cycle"),
             ({"firing_intervals": [-60, 780]}, "has a negative interval"),

@@ -164,6 +164,14 @@ def test_a_zero_at_the_other_dead_centre_is_doubted(tmp_path: Path) -> None:
         in warning
     )
     assert facts_of(problem)[0].torque == pytest.approx(-9.52, abs=0.01)
+    early = " ".join(map(str, bench("other-dead-centre.csv", tmp_path, gas="angle_zero = 0").plausibility_warnings))
+    assert "180 deg less" in early
+    late = " ".join(map(str, bench("other-dead-centre.csv", tmp_path, gas="angle_zero = 180").plausibility_warnings))
+    assert "check angle_zero; 360 deg" in late
+    negative = " ".join(
+        map(str, bench("other-dead-centre.csv", tmp_path, gas="angle_zero = 360").plausibility_warnings)
+    )
+    assert "check angle_zero; 180 deg more would move the peak to 12 deg" in negative
     right = bench("other-dead-centre.csv", tmp_path, gas="angle_zero = -180")
     assert not right.plausibility_warnings
     assert facts_of(right)[0].torque == pytest.approx(15.60, abs=0.01)
@@ -173,7 +181,10 @@ def test_a_pressure_over_300_bar_is_doubted(tmp_path: Path) -> None:
     problem = bench("kilopascal.csv", tmp_path, speed=2500)
     warnings = " ".join(map(str, problem.plausibility_warnings))
     assert "peak pressure of the gas = 4753 bar: is more than 300 bar" in warnings
+    assert "check pressure_unit; it may be kPa" in warnings
     assert "kW for each litre" in warnings
+    pascal = bench("kilopascal.csv", tmp_path, gas='pressure_unit = "kbar"')
+    assert "it may be Pa" in " ".join(map(str, pascal.plausibility_warnings))
     right = bench("kilopascal.csv", tmp_path, gas='pressure_unit = "kPa"')
     assert not right.plausibility_warnings
     assert facts_of(right)[0].peak_pressure == pytest.approx(47.53e5, rel=1e-3)
@@ -347,6 +358,13 @@ REFUSED = {
     "no number of a cycle": (rows(A, P), "cycles = 0", "gas.cycles = 0: is no choice of cycles"),
     "half a column": (rows(A, P), "angle_column = 1.5", "gas.angle_column = 1.5: is neither name nor number"),
     "no column": (rows(A, P), "pressure_column = []", "names no column; name one"),
+    "a column twice": (rows(A, P), "pressure_column = [2, 2]", "names a column twice; name it once"),
+    "angles as pressures": (rows(A, P, head="KW,p\ndeg,bar\n"), 'pressure_column = "KW"',
+                            "takes the pressure from 'KW', whose unit is deg; name another column"),
+    "pressures as angles": (rows(A, P, head="KW,p\ndeg,bar\n"), "angle_column = 2",
+                            "gas.angle_column = 2: takes the angle from 'p', whose unit is bar; name another"),
+    "a sheet of a text": (rows(A, P), 'sheet = "Data"', "is a text without sheets; leave out the key sheet"),
+    "wide steps": (rows(A[::40], P[::40]), "", "no point between -360 and -320 deg, gaps must not exceed 30 deg"),
     "half a column among others": (rows(A, P), "pressure_column = [2.5]", "[1] = 2.5: is neither name nor number"),
     "no such cycle": (rows(A, P, P), "cycles = 3", "gas.cycles = 3: is not among 2 cycles; count them from 1"),
     "no such cycle of one": (rows(A, P), "cycles = 3", "gas.cycles = 3: is not in the file, which has one cycle"),

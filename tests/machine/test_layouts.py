@@ -239,7 +239,7 @@ class TestFiring:
     def test_shared_pin_cannot_serve_two_angles(self) -> None:
         """A 60 degree V6 on three plain throws does not fire evenly, and says which cylinders disagree."""
         with pytest.raises(
-            ModelError, match=r"cannot be even with these pins and banks: cylinder 4 wants .*; give the"
+            ModelError, match=r"cannot be even with these pins and banks: cylinder 4 needs .*; give the"
         ):
             even_throws(FOUR, vee(6, 0.1, math.radians(60)), [1, 4, 2, 5, 3, 6])
 

@@ -149,7 +149,7 @@ def _advice(table: EngineTable, order: Sequence[int], keys: Mapping[str, Any]) -
     if "split_pin_angle" in keys:
         written.append(f"split_pin_angle = {math.degrees(keys['split_pin_angle']):.6g}")
         if len(written) == 1:
-            return f"if its pins are split, write {written[0]}"
+            return f"if its pins are split, write {written[0]}; if it fires unevenly, list firing_intervals"
     if keys.keys() == {"throws"}:
         return f"if the angles of the throws count against the rotation, write {written[-1]}"
     gone = [key for key in ("first_bank", "first_end") if is_list and own_keys.get(key)]

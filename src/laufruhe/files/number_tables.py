@@ -113,6 +113,8 @@ def number_table(content: bytes, suffix: str, sheet: str | None = None) -> Numbe
         return _of_matlab(content)
     if suffix in (".xlsx", ".xlsm") or content.startswith(b"PK\x03\x04"):
         return _of_spreadsheet(content, sheet)
+    if sheet is not None:
+        raise ModelError("is a text without sheets; leave out the key sheet")
     lines = [line.strip("\r\n") for line in _text(content).splitlines()]
     separator, decimal = _dialect(lines)
     is_comment = [line.lstrip().startswith(_COMMENTS) for line in lines]

@@ -29,6 +29,8 @@ _UNLIKE, _MANY = 0.7, 0.2
 _LARGER = 3.0
 """Range of a column over that of the first pressure from which the first may be no cylinder pressure."""
 _FEWEST, _LISTED = 4, 3
+_ROUNDING = 1e-9
+"""Noise over the range of the pressure up to which it is that of the arithmetic."""
 _WHOLE = 0.95
 """Least share of the points of the longest cycle that a cycle has."""
 _NEAR_FIRING = math.radians(60.0)
@@ -102,7 +104,9 @@ class RecordedFile:
         if len(self.values) < _FEWEST:
             raise self.refused(f"has {counted(len(self.values), 'row')}, too few for a cycle", "give one every degree")
         self.angle_column = self._angle_column()
+        self._require_unit(self.angle_column, "rad", "angle")
         self.pressure_columns = self._pressure_columns()
+        self._require_unit(self.pressure_columns[0], "Pa", "pressure")
         names = [self.name(column) for column in self.pressure_columns]
         pressures = f"{names[0]} to {names[-1]}" if len(names) > _LISTED else ", ".join(names)
         self.said.insert(0, f"Crank angle from {self.name(self.angle_column)}, pressure from {pressures}.")
@@ -128,6 +132,13 @@ class RecordedFile:
             remedy = nearest(word, named) if named else f"give its number, 1 to {len(names)}"
             raise Refused(where, word, "is no heading of the file", remedy)
         return plain.index(word.strip().lower())
+
+    def _require_unit(self, column: int, dimension: str, thing: str) -> None:
+        unit, key = self.numbers.units[column], f"{thing}_column"
+        if unit and unit.dimension != dimension and not getattr(self.table, f"{thing}_unit"):
+            rule = f"takes the {thing} from {self.name(column)}, whose unit is {unit.name}"
+            key_or_file = "file" if getattr(self.table, key) is None else key
+            raise self.refused(rule, f"name another column by {key}", key_or_file)
 
     def _angle_column(self) -> int:
         if self.table.angle_column is not None:
@@ -156,6 +167,8 @@ class RecordedFile:
             columns = [self._column(word, "pressure_column") for word in words]
             if not columns:
                 raise self.refused("names no column", "name one", "pressure_column")
+            if len(set(columns)) < len(columns):
+                raise self.refused("names a column twice", "name it once", "pressure_column")
             return columns
         values, units = self.values, self.numbers.units
         others = [k for k in range(len(units)) if k != self.angle_column]
@@ -231,7 +244,8 @@ def recorded_trace(
     if smooth.cut_off is not None and table.smooth:
         angles, pressures = smooth.angles, smooth.pressures
         treatment = f"removed by a low-pass that halves order {smooth.cut_off:.3g} of crank speed"
-    file.said += [f"Noise: {_bar(smooth.noise, 2)} rms, {treatment}."] if smooth.noise else []
+    if smooth.noise > _ROUNDING * np.ptp(pressures):
+        file.said.append(f"Noise: {_bar(smooth.noise, 2)} rms, {treatment}.")
     _require_exchange(file, angles, pressures, cycle, period)
     exchange = 0.5 * period if cycle is Cycle.FOUR_STROKE else 0.0
     angles = angles + _zero(file, angles, pressures, zero, exchange, period)

@@ -120,9 +120,9 @@ def _one_period(points: Array, pressures: Array, cycle: Cycle, cycle_angle: floa
         first = 0.5 * (pressures[0] + pressures[-1])
         points, pressures = points[:-1], np.concatenate([[first], pressures[1:-1]])
     inner, outer = np.diff(points), float(points[0] + cycle_angle - points[-1])
-    if outer > min(2.0 * float(inner.max()), MAX_TRACE_GAP):
-        raise ModelError(f"{ends}, so {math.degrees(outer):.6g} of the {period} are missing; give the whole cycle")
     k = int(np.argmax(inner))
+    if outer > min(2.0 * inner[k], max(inner[k], MAX_TRACE_GAP)):
+        raise ModelError(f"{ends}, so {math.degrees(outer):.6g} of the {period} are missing; give the whole cycle")
     if inner[k] > MAX_TRACE_GAP:
         raise ModelError(
             f"the trace has no point between {math.degrees(points[k]):.6g} and {math.degrees(points[k + 1]):.6g} deg, "

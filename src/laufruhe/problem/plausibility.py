@@ -30,6 +30,8 @@ MAX_SAG, MIN_SAG = 0.1, 1e-6
 
 MAX_PEAK, MIN_GAS = 300e5, 0.1e5
 """Largest usual peak pressure, and least usual absolute pressure in a cylinder [Pa]; diesel engines reach 250 bar."""
+MAX_KILOPASCAL = 30_000e5
+"""Largest usual peak pressure if kPa are taken as bar [Pa]."""
 LATEST_PEAK = math.radians(60.0)
 """Largest usual angle between firing and peak pressure."""
 MAX_POWER = 250e6
@@ -133,7 +135,8 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
         peak = quantity_text(1e-5 * facts.peak_pressure, "bar")
         if facts.peak_pressure > MAX_PEAK:
             rule = "is more than 300 bar; diesel engines reach 250 bar"
-            yield Complaint("peak pressure of the gas", peak, rule, "check pressure_unit; it may be kPa")
+            unit = "kPa" if facts.peak_pressure < MAX_KILOPASCAL else "Pa"
+            yield Complaint("peak pressure of the gas", peak, rule, f"check pressure_unit; it may be {unit}")
         if facts.least_pressure < MIN_GAS:
             lowest = quantity_text(1e-5 * facts.least_pressure, "bar")
             rule = "is nearly a vacuum"
@@ -144,7 +147,8 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
         angle = math.degrees(facts.peak_angle)
         place = f"the peak of {peak} lies {angle:.4g} deg after the firing dead centre"
         half_turns = 180.0 * round(angle / 180.0)
-        check = f"check angle_zero; {half_turns:g} deg less would move the peak to {angle - half_turns:.4g} deg"
+        change = f"{abs(half_turns):g} deg {'less' if half_turns > 0.0 else 'more'}"
+        check = f"check angle_zero; {change} would move the peak to {angle - half_turns:.4g} deg"
         if facts.imep < -_ROUNDING * facts.peak_pressure:
             rule = f"is {quantity_text(facts.torque, 'N m')}, so the gas takes work" + f", and {place}" * lies_late
             remedy = check if lies_late and half_turns else "check angle_zero, unless the engine was motored"

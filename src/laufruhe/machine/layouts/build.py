@@ -135,19 +135,20 @@ def even_throws(
     The first cylinder of the order has its dead centre at phi = 0.
     """
     step, upright = Fraction(cycle.turns, len(firing_order)), [0.0] * len(layout.throw_positions)
-    inputs: dict[int, Turn] = {}
+    inputs: dict[int, tuple[Turn, int]] = {}
     for place, number in enumerate(firing_order):
         k = number - 1
         fires = sum(map(as_turn, intervals[:place])) if intervals else place * step
         turn = (layout.dead_centre(upright, k) - fires) % 1
-        first = inputs.setdefault(layout.pins[k], turn)
+        first, own = inputs.setdefault(layout.pins[k], (turn, number))
         if abs(math.remainder(float(first - turn), 1.0)) > SAME_TURN:
             raise ModelError(
-                f"firing order {list(firing_order)} cannot be {'so' if intervals else 'even'} with these pins and "
-                f"banks: cylinder {number} wants its throw at {math.degrees(angle_of(turn)):.6g} deg, another on it at "
-                f"{math.degrees(angle_of(first)):.6g} deg; give the throws"
+                f"firing order {list(firing_order)} cannot {'have these intervals' if intervals else 'be even'} with "
+                f"these pins and banks: cylinder {number} needs its throw at {math.degrees(angle_of(turn)):.6g} deg, "
+                f"cylinder {own} on the same throw at {math.degrees(angle_of(first)):.6g} deg; "
+                f"{'correct the intervals' if intervals else 'give the throws'}"
             )
-    return tuple(angle_of(inputs[pin]) for pin in range(len(layout.throw_positions)))
+    return tuple(angle_of(inputs[pin][0]) for pin in range(len(layout.throw_positions)))
 
 
 @dataclass(frozen=True)
