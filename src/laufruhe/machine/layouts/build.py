@@ -140,12 +140,12 @@ def even_throws(
         k = number - 1
         fires = sum(map(as_turn, intervals[:place])) if intervals else place * step
         turn = (layout.dead_centre(upright, k) - fires) % 1
-        first, own = inputs.setdefault(layout.pins[k], (turn, number))
+        first, neighbour = inputs.setdefault(layout.pins[k], (turn, number))
         if abs(math.remainder(float(first - turn), 1.0)) > SAME_TURN:
             raise ModelError(
                 f"firing order {list(firing_order)} cannot {'have these intervals' if intervals else 'be even'} with "
                 f"these pins and banks: cylinder {number} needs its throw at {math.degrees(angle_of(turn)):.6g} deg, "
-                f"cylinder {own} on the same throw at {math.degrees(angle_of(first)):.6g} deg; "
+                f"cylinder {neighbour} on the same throw at {math.degrees(angle_of(first)):.6g} deg; "
                 f"{'correct the intervals' if intervals else 'give the throws'}"
             )
     return tuple(angle_of(inputs[pin][0]) for pin in range(len(layout.throw_positions)))
