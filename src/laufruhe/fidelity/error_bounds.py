@@ -249,9 +249,11 @@ def regret_bound(problem: Problem, design: Evaluation, lower_bound: float) -> fl
     omitted = 0.0
     if exact != replace(fidelity, samples=samples, gas_samples=fidelity.gas_steps, tolerance=None):
         terms, limits = ([part.measure for part in parts] for parts in (problem.objective, problem.limits))
-        if any(_norm_of_change(m, design, evaluation) > 0.0 if m.is_load else m.depends_on_loads for m in limits):
+        if any(m.depends_on_loads and not m.is_load for m in limits) or not all(m.is_mass or m.is_load for m in terms):
             return None
-        if not all(m.is_mass or (m.is_load and keeps_omitted(m.channel, kinds, problem)) for m in terms):
+        if not all(keeps_omitted(m.channel, kinds, problem) for m in (*terms, *limits) if m.is_load):
+            return None
+        if any(_norm_of_change(m, design, evaluation) > 0.0 for m in limits if m.is_load):
             return None
         omitted = largest_change(problem, design, evaluation)
     value, minimum = objective_value(problem, evaluation), lower_bound - omitted
