@@ -363,7 +363,7 @@ REFUSED = {
                             "takes the pressure from 'KW', whose unit is deg; name another column"),
     "pressures as angles": (rows(A, P, head="KW,p\ndeg,bar\n"), "angle_column = 2",
                             "gas.angle_column = 2: takes the angle from 'p', whose unit is bar; name another"),
-    "a sheet of a text": (rows(A, P), 'sheet = "Data"', "is a text without sheets; leave out the key sheet"),
+    "a sheet of a text": (rows(A, P), 'sheet = "Data"', "is no workbook, so it has no sheets; leave out the key sheet"),
     "wide steps": (rows(A[::40], P[::40]), "", "no point between -360 and -320 deg, gaps must not exceed 30 deg"),
     "half a column among others": (rows(A, P), "pressure_column = [2.5]", "[1] = 2.5: is neither name nor number"),
     "no such cycle": (rows(A, P, P), "cycles = 3", "gas.cycles = 3: is not among 2 cycles; count them from 1"),

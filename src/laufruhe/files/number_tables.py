@@ -109,12 +109,13 @@ def number_table(content: bytes, suffix: str, sheet: str | None = None) -> Numbe
     for mark, name in _BINARY.items():
         if content.startswith(mark):
             raise ModelError(f"is {name}; save it as text, as .xlsx, or as .mat with -v7")
+    is_book = suffix in (".xlsx", ".xlsm") or content.startswith(b"PK\x03\x04")
+    if sheet is not None and not is_book:
+        raise ModelError("is no workbook, so it has no sheets; leave out the key sheet")
     if suffix == ".mat" or content.startswith(b"MATLAB"):
         return _of_matlab(content)
-    if suffix in (".xlsx", ".xlsm") or content.startswith(b"PK\x03\x04"):
+    if is_book:
         return _of_spreadsheet(content, sheet)
-    if sheet is not None:
-        raise ModelError("is a text without sheets; leave out the key sheet")
     lines = [line.strip("\r\n") for line in _text(content).splitlines()]
     separator, decimal = _dialect(lines)
     is_comment = [line.lstrip().startswith(_COMMENTS) for line in lines]

@@ -19,6 +19,7 @@ from laufruhe.files.number_tables import NumberTable, unit_in
 from laufruhe.machine import Cycle, PressureTrace
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.pressure_trace import smooth_cycle
+from laufruhe.units import quantity_text
 
 _ANGLE_NAME = re.compile(r"angle|winkel|^(?:ca|kw|cad|theta|phi|alpha|gamma)\b", re.IGNORECASE)
 _GAUGE_NAME = re.compile(r"gauge|überdruck|ueberdruck", re.IGNORECASE)
@@ -263,7 +264,7 @@ def recorded_trace(
 
 
 def _bar(pressure: float, digits: int = 4) -> str:
-    return f"{1e-5 * pressure:.{digits}g} bar"
+    return quantity_text(1e-5 * pressure, "bar", digits)
 
 
 def _finite(values: Array) -> Array:
