@@ -84,7 +84,7 @@ def test_a_bound_of_nothing_is_told_as_none(problem: Problem) -> None:
     local = replace(found, certificate=replace(found.certificate, kind=Proof.LOCAL, lower_bound=0.0, gap=1.0))
     for each in (empty, local):
         text = f"{headline(each)} {explained(each)}"
-        assert "no useful bound was found" in headline(each)
+        assert "no useful lower bound was found" in headline(each)
         assert "No useful bound was found in the time given." in explained(each)
         assert "100 %" not in text
         assert "less than 0" not in text
