@@ -26,6 +26,7 @@ HEAVY = {
     "jinja2",
     "matplotlib",
     "netCDF4",
+    "openpyxl",
     "pandas",
     "pint",
     "scipy",

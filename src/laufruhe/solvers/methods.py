@@ -30,6 +30,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, ProofStrength
+from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.boxes.place_boxes import without_places
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
@@ -42,13 +43,17 @@ from laufruhe.solvers.conclusion import (
     with_constant_limits,
     without_proof,
 )
+from laufruhe.solvers.cones.equal_designs import free_decisions
+from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
 from laufruhe.solvers.decomposition import is_separable, solve_decomposed
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, imported, is_no_number, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
+from laufruhe.solvers.stars.even_search import refuse_long
 from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
+from laufruhe.solvers.walk import check_by_walk
 
 OPTIONAL_PACKAGES = ("casadi", "clarabel", "cvxpy")
 """Optional packages that some methods import."""
@@ -252,17 +257,11 @@ def solve(
         result = replace(result, problem=replace(result.problem, origin=problem.origin))
         if reports:
             return without_proof(result, reports[0])
-        from laufruhe.solvers.walk import check_by_walk
-
         result = check_by_walk(problem, result, time.thread_time() - spent)
         if not diagnose or result.status is Status.FEASIBLE:
             return result
         if result.status is Status.OPTIMAL:
-            from laufruhe.solvers.cones.equal_designs import free_decisions
-
             return replace(result, free=free_decisions(result))
-        from laufruhe.solvers.attainable_limits import with_attainable_limits
-
         result = with_attainable_limits(
             result, problem, open_kinds(problem), time.perf_counter() - started, _solve_reduced
         )
@@ -319,8 +318,6 @@ def refuse(problem: Problem) -> None:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")
     if problem.phasing is not None and _method(problem).solver is _SOLVE_STARS:
-        from laufruhe.solvers.stars.even_search import refuse_long
-
         refuse_long(problem)
 
 
@@ -335,11 +332,8 @@ def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = Non
             return reduction.solve(problem, _solve_reduced, partial(_solve_reduced, remaining=remaining[k + 1 :]))
     method, kinds = _method(problem), open_kinds(problem)
     report_progress(method.name)
-    if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS}:
-        from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
-
-        if conflict := conflict_on_any_mounts(problem):
-            return infeasible_result(problem, evaluate_start(problem), conflict, {})
+    if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS} and (conflict := conflict_on_any_mounts(problem)):
+        return infeasible_result(problem, evaluate_start(problem), conflict, {})
     closing = _exact_part(problem, kinds, method)
     if closing is None:
         return method.solve(problem)
