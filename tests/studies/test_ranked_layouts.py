@@ -85,7 +85,8 @@ def test_engines_are_ranked_by_what_their_designs_do(data: xr.Dataset) -> None:
     assert irregularity(engine, point, 1.0) == pytest.approx(row[4])
     masses = sum(abs(r.unbalance) / r.radius for r in result.final.engine.rotors if r.radius)
     assert row[1] == pytest.approx(masses, rel=1e-2)
-    assert row[0] + row[1] == pytest.approx(result.objective.value, rel=1e-6)
+    # a study ends at the tolerance of the problem, 1e-3; a solve goes on to the last digits
+    assert result.certificate.lower_bound <= row[0] + row[1] <= result.objective.value * (1.0 + 1e-5)
     assert np.isfinite(data["further"].values).all()
     assert set(data["why_none"].values.ravel().tolist()) == {""}
 

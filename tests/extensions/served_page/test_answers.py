@@ -220,7 +220,10 @@ def test_a_front_comes_as_a_whole_first_and_no_point_is_dominated() -> None:
     # the optimum under a limit is on the front of that limit
     found = follow(LANCHESTER, edits=(Edit("set", "constraints.1.max", f"{by_mass[4]['across']!r} kg"),))
     assert found["claim"]["value"] == pytest.approx(by_mass[4]["value"], rel=1e-4)
-    assert "is no measure" in json.loads(answers.front(source(LANCHESTER), PageState(), "beauty", 0))["error"]
+    assert (
+        "is not the name of a measure"
+        in json.loads(answers.front(source(LANCHESTER), PageState(), "beauty", 0))["error"]
+    )
 
 
 def test_a_front_of_a_simpler_problem_has_no_bound() -> None:
