@@ -26,7 +26,7 @@ class RootMeanQuad(Norm):
     """Fourth root of the weighted mean of the fourth powers of row lengths."""
 
     name = "rmq"
-    is_convex = is_smooth = is_monotone_in_lengths = True
+    averages = is_convex = is_smooth = is_monotone_in_lengths = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return (sum_k w_k |v_k|^4)^(1/4) over rows v_k with weights w_k."""
