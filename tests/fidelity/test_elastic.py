@@ -48,7 +48,7 @@ def _fidelity(rng: random.Random) -> Fidelity:
 
 
 def _violation(seed: int) -> tuple[float, float]:
-    """True error less the stated one, and their ratio."""
+    """Return the true error less the stated one, and their ratio."""
     rng = random.Random(300_000 + seed)
     problem = random_elastic_problem(rng, gas=False)
     own = replace(problem, fidelity=_fidelity(rng))
@@ -57,7 +57,7 @@ def _violation(seed: int) -> tuple[float, float]:
     except UncarriedLoadError:
         return 0.0, 1.0
     value = objective_value(own, found)
-    truth = objective_value(problem, evaluate(finer(problem, 1009)))
+    truth = objective_value(problem, evaluate(finer(problem, 7001)))
     true = abs(value - truth) / value if value else 0.0
     stated = ErrorReference(own, best).error_of(found)
     return true - stated, stated / true if true > 1e-6 else 1.0
