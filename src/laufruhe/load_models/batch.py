@@ -127,8 +127,6 @@ class BatchNorm:
         """Return the lengths of the load rows of every design, shape (designs, k).
 
         `product` has the rows of all designs: features times coefficients. It is overwritten.
-
-        The product is overwritten.
         """
         components, _, k = self.rows.shape
         if components == 1:

@@ -16,6 +16,8 @@ from laufruhe.numerics.norms import Cones, Grid, lengths
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
 
+TIGHT: Mapping[str, float] = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
+"""First settings of the solver; at flat optima, decisions are accurate only if the gap is small."""
 MINIMUM_SHARE = 1e-7
 """Multipliers of sums of terms below this share of their total are set to zero."""
 MINIMUM_SECONDS = 0.05

@@ -18,6 +18,7 @@ from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Multipliers, excludes, is_moved
 from laufruhe.solvers.cones.cone_program import (
+    TIGHT,
     ConicSolution,
     build_program,
     project_on_sets,
@@ -29,8 +30,6 @@ from laufruhe.solvers.cones.cone_program import (
 from laufruhe.solvers.cones.equations import equations_of
 from laufruhe.solvers.cones.newton import newton_solution
 
-# at flat optima, decisions are accurate only if the gap is small
-TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
 ATTEMPTS: tuple[Mapping[str, Any], ...] = (
     TIGHT,
     # limits that nearly contradict each other

@@ -18,6 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid
 from laufruhe.prove.certificate import ROUNDING, Multipliers, flatten_interior, lower_bound, minorant
 from laufruhe.solvers.cones.cone_program import (
+    TIGHT,
     build_program,
     project_on_sets,
     read_solution,
@@ -49,8 +50,6 @@ SMALL = 1e-6
 """Objective relative to a typical load from which loads do not cancel."""
 WORTHWHILE = 0.1
 """Largest ratio of gaps before and after a step that does not lower the objective."""
-TIGHT: dict[str, float] = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
-"""First settings of the solver of steps with cones."""
 
 Step = tuple[Array, Multipliers]
 """Decision vector, shape (n,), and dual rows there."""

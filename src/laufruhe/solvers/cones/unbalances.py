@@ -151,7 +151,7 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
     for k in until_time_limit(range(maximum + 1)):
         # Newton's method on the grid of the next bound may save the larger program
         optimum = polish(model, best, 2 * samples) if best is not None else None
-        if optimum is None or optimum.gap > problem.tolerance:
+        if optimum is None or optimum is best or optimum.gap > problem.tolerance:
             optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
             if _is_feasible(problem, best):
