@@ -69,8 +69,9 @@ def _short(name: str) -> str:
 
 def _words(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str) -> str:
     """What is told of this key alone, what its table says of itself, or what is told of the key wherever it stands."""
-    told = _told()["words"]
-    return str(told.get(path) or _of_table(schema, entry) or told.get(path.rpartition(".")[2], ""))
+    told, of_table = _told()["words"], _of_table(schema, entry)
+    own = "" if of_table == ANYWHERE else of_table
+    return str(told.get(path) or own or told.get(path.rpartition(".")[2], ""))
 
 
 def alternatives(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
@@ -145,9 +146,14 @@ def _of(schema: Mapping[str, Any], one: Mapping[str, Any], depth: int) -> Any:
     return _NUMBERS.get(str(one.get("type")), {})
 
 
-def schema() -> str:
+def problem_schema() -> dict[str, Any]:
     """The schema of problem files as the models have it now."""
-    return _text(_schema(file_model()))
+    return _schema(file_model())
+
+
+def schema() -> str:
+    """The text of the schema of problem files."""
+    return _text(problem_schema())
 
 
 def _schema(model: type[BaseModel], kept: Callable[[Any], Any] = lambda found: found) -> dict[str, Any]:
@@ -209,3 +215,8 @@ def study_schema() -> str:
 if __name__ == "__main__":
     for name, text in zip(ready.SCHEMAS, (schema(), study_schema()), strict=True):
         (FOLDER / name).write_text(text, encoding="utf-8")
+    # this file is imported there by its name
+    from python_tables import texts
+
+    for path, text in texts().items():
+        path.write_text(text, encoding="utf-8")

@@ -20,21 +20,44 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
+    from laufruhe import machine as machine
+    from laufruhe import plots as plots
     from laufruhe.machine import Engine, OperatingPoint
+    from laufruhe.problem.number_types import open_number as open
     from laufruhe.problem.problem import Problem
+    from laufruhe.python import tables as tables
+    from laufruhe.python.draft import EngineDraft
+    from laufruhe.python.layouts import (
+        boxer,
+        delta,
+        engine,
+        inline,
+        opposed_piston,
+        parts,
+        radial,
+        rotary,
+        vee,
+        x_engine,
+    )  # fmt: skip
+    from laufruhe.python.lists import engines, examples
     from laufruhe.report.saved_result import SavedResult, read_result, write_result
     from laufruhe.solvers.result import Result
 
+_LAYOUTS = ("boxer", "delta", "engine", "inline", "opposed_piston", "parts", "radial", "rotary", "vee", "x_engine")
 # imported at first use, so that import laufruhe is quick
 _ELSEWHERE = {
+    "EngineDraft": "laufruhe.python.draft",
     "Problem": "laufruhe.problem.problem",
     "Result": "laufruhe.solvers.result",
+    **dict.fromkeys(_LAYOUTS, "laufruhe.python.layouts"),
+    **dict.fromkeys(("engines", "examples"), "laufruhe.python.lists"),
     **dict.fromkeys(("SavedResult", "read_result", "write_result"), "laufruhe.report.saved_result"),
 }
-_ROOMS = ("machine", "plots")
+_MODULES = {"machine": "laufruhe.machine", "plots": "laufruhe.plots", "tables": "laufruhe.python.tables"}
 
 __version__ = "0.3.0"
 __all__ = [
+    "EngineDraft",
     "InputError",
     "LaufruheError",
     "ModelError",
@@ -43,13 +66,29 @@ __all__ = [
     "SavedResult",
     "SolverError",
     "__version__",
+    "boxer",
+    "delta",
+    "engine",
+    "engines",
     "evaluate",
     "evaluate_many",
+    "examples",
+    "inline",
     "load",
+    "machine",
+    "open",
+    "opposed_piston",
+    "parts",
+    "plots",
+    "radial",
     "read_result",
+    "rotary",
     "solve",
     "study",
+    "tables",
+    "vee",
     "write_result",
+    "x_engine",
 ]
 
 P = ParamSpec("P")
@@ -61,8 +100,10 @@ Source: TypeAlias = Union[str, Path, Mapping[str, Any]]  # noqa: UP007
 if not TYPE_CHECKING:
     # type checkers should still find misspelt names
     def __getattr__(name: str) -> Any:
-        if name in _ROOMS:
-            return import_module(f"laufruhe.{name}")
+        if name == "open":
+            return import_module("laufruhe.problem.number_types").open_number
+        if name in _MODULES:
+            return import_module(_MODULES[name])
         if name not in _ELSEWHERE:
             raise AttributeError(f"module 'laufruhe' has no attribute '{name}'")
         return getattr(import_module(_ELSEWHERE[name]), name)

@@ -131,6 +131,19 @@ def _factor(unit: str, si_unit: str) -> float:
     return ratio
 
 
+def quantity(value: float, unit: str, target: Any = "") -> pint.Quantity[float]:
+    """Return an SI value as a quantity, in the unit `target` if given.
+
+    `target` is a text, or a unit of the caller's registry; by default the quantity is of the application's registry.
+    """
+    import pint
+
+    of_application: Any = pint.application_registry
+    registry = getattr(target, "_REGISTRY", of_application)
+    result: pint.Quantity[float] = registry.Quantity(value, unit or "dimensionless")
+    return result.to(target) if target else result
+
+
 _EXAMPLES = {
     "m": ("a length", "120 mm"),
     "kg": ("a mass", "1.25 kg"),

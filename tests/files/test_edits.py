@@ -126,14 +126,14 @@ def test_throws_take_values_by_the_names_that_results_show() -> None:
     assert again.objective is not None
     assert again.objective.value == pytest.approx(result.objective.value, rel=1e-9)
     with pytest.raises(InputError, match="give values for all throws"):
-        problem.with_values({"throw 2": 40})
-    given = laufruhe.load(LANCHESTER).with_values({"throw 2": 170})
+        problem.with_values({"throw 2": "40 deg"})
+    given = laufruhe.load(LANCHESTER).with_values({"throw 2": "170 deg"})
     assert given.engine.slider_cranks[1].throw == pytest.approx(math.radians(170))
 
 
 def test_shafts_that_a_star_leaves_out_are_left_out() -> None:
     problem = laufruhe.load(PROBLEMS / "two-stroke-four-open.toml")
-    throws = {f"throw {k + 1}": angle for k, angle in enumerate((0, 90, 270, 180))}
+    throws = {f"throw {k + 1}": f"{angle} deg" for k, angle in enumerate((0, 90, 270, 180))}
     for built in (0, 1):
         found = problem.with_values({**throws, "balancer built": built})
         assert any(rotor.shaft.name == "balancer" for rotor in found.engine.rotors) is bool(built)

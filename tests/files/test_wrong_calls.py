@@ -80,7 +80,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
     assert [math.degrees(part.throw) for part in problem.engine.cylinders] == pytest.approx([0.0, 180.0])
     (decision,) = problem.open("web.balance_factor", *np.array([0.25, 0.5])).decisions
     assert (decision.lower, decision.upper) == (0.25, 0.5)
-    turned = problem.with_values({"engine.throws": throws[::-1]}).engine.cylinders
+    turned = problem.with_values({"engine.throws": np.radians(throws[::-1])}).engine.cylinders
     assert [part.throw for part in turned] == [part.throw for part in problem.engine.cylinders][::-1]
     single = laufruhe.load({**tables, "engine": {**engine, "rod_ratio": 0.3, "cylinders": np.int64(1)}})
     assert len(single.engine.cylinders) == 1

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any, TypeAlias
 
 from laufruhe import units
-from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.complaints import Refused, nearest, read_number
+from laufruhe.files.fields import Number
 from laufruhe.files.nested import at, with_value_at
 from laufruhe.files.problem_file import EXTENSION_KEYS, file_model
+from laufruhe.files.python_numbers import SIZES, sized, written
 from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.files.study_tables import keys_of
 
 Keys: TypeAlias = tuple[Any, ...]
 _AXES = {"x": 0, "y": 1, "z": 2}
 _SIZES = ("mass", "unbalance", "balance_factor")
+_ANGLE = Number("rad", plain=math.radians(1.0))
 _ACROSS = {"y": 0, "z": 1}
 _NUMBER = re.compile(r"\s*-\s*(?=[\d.])")
 _THROW, _BUILT = re.compile(r"throw (\d{1,3})"), " built"
@@ -32,6 +36,7 @@ def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     if engine.get("throws") == "open" and star and sorted(star) == list(range(1, len(star) + 1)):
         phases = {key: values[name] for key in PHASES if (name := key.replace("_", " ")) in values}
         phases["throws"] = [values[star[k]] for k in sorted(star)]
+        phases = {key: written(phase, ("engine", key), tables) for key, phase in phases.items()}
         built_names = {name: name.removesuffix(_BUILT) for name in values if name.endswith(_BUILT)}
         edited = with_star(tables, phases, [shaft for name, shaft in built_names.items() if not float(values[name])])
         done = {*star.values(), *built_names, *(key.replace("_", " ") for key in phases)}
@@ -43,14 +48,46 @@ def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
 def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, Any]:
     """Return tables with another value of one number; an open number starts at the value and stays open."""
     keys = keys_by_name(tables, name)
-    now = at(tables, keys)
+    if isinstance(value, complex) and keys[-1] in SIZES:
+        return _with_vector(tables, keys, value)
+    now, value = at(tables, keys), written(value, keys, tables)
     return with_value_at(tables, keys, {**now, "start": value} if _is_open(now) else value)
+
+
+def _with_vector(tables: Mapping[str, Any], keys: Keys, value: complex) -> dict[str, Any]:
+    """Return tables with size and angle of a weight; `keys` are the address of the size."""
+    size, now = at(tables, keys), at(tables, (*keys[:-1], "angle"))
+    parts = sized(keys[-1], value, None, keys[:-1])
+    if _is_open(now):
+        low = read_number(_ANGLE, (*keys[:-1], "angle"), now["between"][0])
+        assert isinstance(low, float)
+        parts["angle"] = low + (parts["angle"] - low) % math.tau
+    for key, old in ((keys[-1], size), ("angle", now)):
+        place = (*keys[:-1], key)
+        new = written(parts[key], place, tables)
+        tables = with_value_at(tables, place, {**old, "start": new} if _is_open(old) else new)
+    return dict(tables)
+
+
+def with_goal(tables: Mapping[str, Any], key: str, goal: Mapping[str, Any], adds: bool) -> dict[str, Any]:
+    """Return tables with an objective or a limit, the table `goal`; it replaces earlier ones unless `adds`.
+
+    `within` of a further objective is the share of the one before it.
+    """
+    earlier = tables.get(key, []) if adds else []
+    goals = [*(earlier if isinstance(earlier, list) else [earlier]), dict(goal)]
+    if len(goals) > 1 and "within" in goals[-1]:
+        goals[-2] = {**goals[-2], "within": goals[-1].pop("within")}
+    goals[-1] = written(goals[-1], (key, len(goals) - 1), {**tables, key: goals})
+    # a complaint about a single objective has no index
+    return {**tables, key: goals if adds else goals[-1]}
 
 
 def open_number(tables: Mapping[str, Any], name: str, low: Any, high: Any, start: Any = None) -> dict[str, Any]:
     """Return tables with a number open between `low` and `high`; by default it starts at its present value."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
+    low, high, start = (written(value, keys, tables) for value in (low, high, start))
     first = start if start is not None else now.get("start") if _is_open(now) else now
     return with_value_at(tables, keys, {"between": [low, high], **({} if first is None else {"start": first})})
 
@@ -59,11 +96,16 @@ def fix_number(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[
     """Return tables with a number fixed at a value, by default at its start."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
+    if isinstance(value, complex) and keys[-1] in SIZES:
+        edited = _with_vector(tables, keys, value)
+        return fix_number(edited, name) if _is_open(now) else edited
     if value is None:
         if not _is_open(now):
             raise Refused(name, now, "is not open", "give a value for it")
-        value = now.get("start", _default_start(*now["between"]))
-    edited = with_value_at(tables, keys, value)
+        new = now.get("start", _default_start(*now["between"]))
+    else:
+        new = written(value, keys, tables)
+    edited = with_value_at(tables, keys, new)
     # an angle may be open only together with its size
     if keys[-1] in _SIZES and _is_open(at(edited, (*keys[:-1], "angle"))):
         return fix_number(edited, f"{name.rpartition('.')[0]}.angle")

@@ -50,12 +50,23 @@ def texts_in(tables: Any) -> Iterator[tuple[Place, str]]:
 
 
 def plain(raw: Any, depth: int) -> Any:
-    """Return a copy of nested tables, down to a depth, with lists and plain numbers for tuples and NumPy values."""
+    """Return a copy of nested tables, down to a depth, with values as a file has them.
+
+    Tuples and arrays become lists, numbers of NumPy plain numbers, quantities of pint texts with a unit.
+    """
     if isinstance(raw, Mapping) and depth:
         return {key: plain(value, depth - 1) for key, value in raw.items()}
     if isinstance(raw, list | tuple) and depth:
         return [plain(value, depth - 1) for value in raw]
+    if hasattr(raw, "magnitude") and hasattr(raw, "units"):
+        return _with_unit(np.asarray(raw.magnitude).tolist(), format(raw.units, "~C"))
     return raw.tolist() if isinstance(raw, np.ndarray | np.generic) else raw
+
+
+def _with_unit(magnitude: Any, unit: str) -> Any:
+    if isinstance(magnitude, list):
+        return [_with_unit(entry, unit) for entry in magnitude]
+    return f"{magnitude!r} {unit}".rstrip()
 
 
 @lru_cache(maxsize=4096)

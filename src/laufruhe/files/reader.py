@@ -20,22 +20,24 @@ from laufruhe.extension import extended
 from laufruhe.files import edits, open_numbers
 from laufruhe.files.bearings import bearings_of, expand_bearings
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, key_path, nearest_file
+from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, key_path, nearest_file, read_number
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import with_fidelity
+from laufruhe.files.fields import Open
 from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import load_cases_of, mounts_of
-from laufruhe.files.nested import plain, walk, with_value_at
+from laufruhe.files.nested import at, number_at, plain, walk, with_value_at
 from laufruhe.files.numbering import sense_of
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, open_phasing
 from laufruhe.files.problem_file import EXTENSION_KEYS, ExtensionContext, Note, ProblemFile, file_model
 from laufruhe.files.quantities import with_followers
+from laufruhe.files.ready import ready_named
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
-from laufruhe.files.toml_text import line_deeper_than, toml_complaint
+from laufruhe.files.toml_text import line_deeper_than, toml_complaint, toml_text
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.phasing import Candidate
@@ -57,7 +59,7 @@ def load(source: str | Path | Mapping[str, Any]) -> Problem:
     Parameters
     ----------
     source
-        Path; text, if it contains a line feed or "="; or tables as nested mappings.
+        Path; name of a ready problem; text, if it contains a line feed or "="; or tables as nested mappings.
 
     Raises
     ------
@@ -79,6 +81,8 @@ def tables_and_path(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, A
     if not str(source).strip():
         raise wrong_call("problem", source, "is empty", "give a path, the text of a problem file, or its tables")
     path = Path(source)
+    if source == path.stem and not path.exists():
+        path = ready_named(path.stem).path
     return tables_of(path), display_path(path)
 
 
@@ -111,7 +115,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
                     stars = replace(phasing, problem_of=lambda star: finished(phasing.problem_of(star), star))
                     problem = replace(problem, phasing=stars)
             _check_decisions(problem)
-            return replace(problem, origin=Origin(tables, path, _apply_edit))
+            return replace(problem, origin=FileOrigin(tables, path))
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, file_model())) from None
     except ModelError as error:
@@ -139,11 +143,27 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
 
 
-def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
-    # the edit names one of the functions of `edits`
-    with errors_in_file(origin.path):
-        tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))
-    return load_tables(tables, origin.path)
+class FileOrigin(Origin):
+    """Tables of a problem file, which edits change."""
+
+    def edited(self, edit: str, *arguments: Any) -> Problem:
+        """Return the problem after an edit, the name of a function of `edits`, with its arguments."""
+        with errors_in_file(self.path):
+            tables = getattr(edits, edit)(self.tables, *plain(arguments, DEEPEST))
+        return load_tables(tables, self.path)
+
+    def number(self, name: str) -> tuple[float, str]:
+        """Return value or start of a number [SI], by its name in results or its path, and its unit."""
+        with errors_in_file(self.path):
+            place = edits.keys_by_name(self.tables, name)
+            value, field = at(self.tables, place), number_at(file_model(), place)
+            if field is None or value is None:
+                raise Refused(name, value, "is no number of this problem", "name a number of the problem file")
+            return Open.from_value(read_number(field, place, value)).start, field.unit
+
+    def to_toml(self) -> str:
+        """Return the text of the problem file."""
+        return toml_text(self.tables)
 
 
 def _changed_drawing(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import html
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path as FilePath
-from typing import Any, ClassVar, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,15 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.problem.decision import Decision, Numbers, apply_decisions
+from laufruhe.problem.goals import Goals
 from laufruhe.problem.measure import Limit, Measure, PriorityLevel, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.plausibility import plausibility_warnings
 from laufruhe.problem.sets import Value
+from laufruhe.units import quantity
+
+if TYPE_CHECKING:
+    import pint
 
 Path: TypeAlias = tuple[str | int, ...]
 """Address of a number in a problem file: keys, and indices in lists from zero."""
@@ -98,21 +104,29 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class Origin:
+class Origin(ABC):
     """File of a problem.
 
     Attributes
     ----------
     tables, path
         Tables as they were read, and path of the file.
-    edited
-        Function of this origin, the name of an edit ("with_values", "open_number" or "fix_number") and its arguments;
-        it returns the new problem.
     """
 
     tables: Mapping[str, Any]
     path: FilePath
-    edited: Callable[..., Problem]
+
+    @abstractmethod
+    def edited(self, edit: str, *arguments: Any) -> Problem:
+        """Return the problem after an edit of its tables, by the name of the edit and its arguments."""
+
+    @abstractmethod
+    def number(self, name: str) -> tuple[float, str]:
+        """Return value or start of a number [SI], by its name in results or its path, and its unit."""
+
+    @abstractmethod
+    def to_toml(self) -> str:
+        """Return the text of the problem file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +141,7 @@ class KnownRows:
 
 
 @dataclass(frozen=True, repr=False)
-class Problem:
+class Problem(Goals):
     """A design problem as solvers and reports need it.
 
     Attributes
@@ -327,7 +341,8 @@ class Problem:
         Parameters
         ----------
         values
-            Names and values as in a file: `{"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28}`.
+            Names and values: `{"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28}`. Numbers without a unit are in
+            SI units, angles in radians; a complex unbalance or mass has size and angle.
 
         Raises
         ------
@@ -350,10 +365,32 @@ class Problem:
         _check_name(name)
         return self._edited("fix_number", name, value)
 
-    def _edited(self, edit: str, *arguments: Any) -> Problem:
+    def __getitem__(self, name: str) -> float:
+        """Return a number of the problem by its name in results or its path [SI]; an open one at its start."""
+        _check_name(name)
+        return self._file.number(name)[0]
+
+    def quantity(self, name: str, unit: Any = "") -> pint.Quantity[float]:
+        """Return a number with its unit [pint], by its name in results or its path, in `unit` if given."""
+        _check_name(name)
+        return quantity(*self._file.number(name), unit)
+
+    def to_toml(self) -> str:
+        """Return the text of the problem file."""
+        return self._file.to_toml()
+
+    def _with_goal(self, key: str, keys: Mapping[str, Any], adds: bool) -> Self:
+        goal = {name: value for name, value in keys.items() if name != "self" and value is not None}
+        return cast("Self", self._edited("with_goal", key, goal, adds))
+
+    @property
+    def _file(self) -> Origin:
         if self.origin is None:
             raise ModelError(f"{self.name} was made or changed in code; edit numbers right after loading its file")
-        return self.origin.edited(self.origin, edit, *arguments)
+        return self.origin
+
+    def _edited(self, edit: str, *arguments: Any) -> Problem:
+        return self._file.edited(edit, *arguments)
 
     def changed(self, **changes: Any) -> Problem:
         """Return the problem with other attributes; with open crank stars, the problem of every star has them too."""

@@ -1,0 +1,235 @@
+"""Objectives and limits of a problem in code.
+
+`python tests/schemas.py` makes this file of the models of problem files.
+"""
+# fmt: off
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Literal, Self, TypeAlias
+
+from laufruhe.problem.number_types import Number, Table, Value, Values
+
+QuantityName: TypeAlias = Literal[
+    "mean mount force", "maximum mount force", "rms mount force", "peak to peak mount force", "worst mean mount force",
+    "rmq mount force", "mean resultant mount force", "maximum resultant mount force", "rms resultant mount force",
+    "peak to peak resultant mount force", "worst mean resultant mount force", "rmq resultant mount force",
+    "mean mount travel", "maximum mount travel", "rms mount travel", "peak to peak mount travel",
+    "worst mean mount travel", "rmq mount travel", "mean shaking force", "maximum shaking force", "rms shaking force",
+    "peak to peak shaking force", "worst mean shaking force", "rmq shaking force", "mean rocking couple",
+    "maximum rocking couple", "rms rocking couple", "peak to peak rocking couple", "worst mean rocking couple",
+    "rmq rocking couple", "mean roll moment", "maximum roll moment", "rms roll moment", "peak to peak roll moment",
+    "worst mean roll moment", "rmq roll moment", "mean surging force", "maximum surging force", "rms surging force",
+    "peak to peak surging force", "worst mean surging force", "rmq surging force", "mean swaying couple",
+    "maximum swaying couple", "rms swaying couple", "peak to peak swaying couple", "worst mean swaying couple",
+    "rmq swaying couple", "mean hammer blow", "maximum hammer blow", "rms hammer blow", "peak to peak hammer blow",
+    "worst mean hammer blow", "rmq hammer blow", "mean main-bearing force", "maximum main-bearing force",
+    "rms main-bearing force", "peak to peak main-bearing force", "worst mean main-bearing force",
+    "rmq main-bearing force", "mean main-bearing pressure", "maximum main-bearing pressure",
+    "rms main-bearing pressure", "peak to peak main-bearing pressure", "worst mean main-bearing pressure",
+    "rmq main-bearing pressure", "mean crank-pin force", "maximum crank-pin force", "rms crank-pin force",
+    "peak to peak crank-pin force", "worst mean crank-pin force", "rmq crank-pin force", "mean crank-pin pressure",
+    "maximum crank-pin pressure", "rms crank-pin pressure", "peak to peak crank-pin pressure",
+    "worst mean crank-pin pressure", "rmq crank-pin pressure", "mean rod force", "maximum rod force", "rms rod force",
+    "peak to peak rod force", "worst mean rod force", "rmq rod force", "mean side force", "maximum side force",
+    "rms side force", "peak to peak side force", "worst mean side force", "rmq side force", "mean friction power",
+    "mean crank torque", "maximum crank torque", "rms crank torque", "peak to peak crank torque",
+    "worst mean crank torque", "rmq crank torque", "mean stored work", "maximum stored work", "rms stored work",
+    "peak to peak stored work", "worst mean stored work", "rmq stored work", "mean crank-pin bending stress",
+    "maximum crank-pin bending stress", "rms crank-pin bending stress", "peak to peak crank-pin bending stress",
+    "worst mean crank-pin bending stress", "rmq crank-pin bending stress", "mean web stress", "maximum web stress",
+    "rms web stress", "peak to peak web stress", "worst mean web stress", "rmq web stress",
+    "mean journal torsion stress", "maximum journal torsion stress", "rms journal torsion stress",
+    "peak to peak journal torsion stress", "worst mean journal torsion stress", "rmq journal torsion stress",
+    "mean journal stress", "maximum journal stress", "rms journal stress", "peak to peak journal stress",
+    "worst mean journal stress", "rmq journal stress", "mean main-bearing pressure times speed",
+    "maximum main-bearing pressure times speed", "rms main-bearing pressure times speed",
+    "peak to peak main-bearing pressure times speed", "worst mean main-bearing pressure times speed",
+    "rmq main-bearing pressure times speed", "mean rod stress", "maximum rod stress", "rms rod stress",
+    "peak to peak rod stress", "worst mean rod stress", "rmq rod stress", "mean share of the buckling load",
+    "maximum share of the buckling load", "rms share of the buckling load", "peak to peak share of the buckling load",
+    "worst mean share of the buckling load", "rmq share of the buckling load", "mean bolt stress",
+    "maximum bolt stress", "rms bolt stress", "peak to peak bolt stress", "worst mean bolt stress", "rmq bolt stress",
+    "mean piston-pin pressure", "maximum piston-pin pressure", "rms piston-pin pressure",
+    "peak to peak piston-pin pressure", "worst mean piston-pin pressure", "rmq piston-pin pressure",
+    "mean piston-pin bending stress", "maximum piston-pin bending stress", "rms piston-pin bending stress",
+    "peak to peak piston-pin bending stress", "worst mean piston-pin bending stress", "rmq piston-pin bending stress",
+    "mean piston-pin deflection", "maximum piston-pin deflection", "rms piston-pin deflection",
+    "peak to peak piston-pin deflection", "worst mean piston-pin deflection", "rmq piston-pin deflection",
+    "mean piston-pin ovality", "maximum piston-pin ovality", "rms piston-pin ovality",
+    "peak to peak piston-pin ovality", "worst mean piston-pin ovality", "rmq piston-pin ovality", "mean shaft twist",
+    "maximum shaft twist", "rms shaft twist", "peak to peak shaft twist", "worst mean shaft twist", "rmq shaft twist",
+    "mean shaft torque", "maximum shaft torque", "rms shaft torque", "peak to peak shaft torque",
+    "worst mean shaft torque", "rmq shaft torque", "mean shaft stress", "maximum shaft stress", "rms shaft stress",
+    "peak to peak shaft stress", "worst mean shaft stress", "rmq shaft stress", "degree of irregularity",
+    "flywheel inertia", "flywheel mass", "rim stress", "arm stress", "counterweight mass", "balancer mass",
+    "added mass", "transmissibility", "static sag", "natural frequencies", "kinetic-energy decoupling",
+    "decoupling shortfall", "torque-roll residual", "raw torque-roll residual", "total stiffness", "static travel",
+    "static mount force", "shaft distance", "shaft clearance", "envelope radius", "apex speed", "apex acceleration",
+    "run-up force", "run-up travel", "run-up twist", "throw clearance", "running-gear mass", "torsional frequencies",
+    "critical speeds", "absorber heat",
+] | str
+"""Quantities that may be minimised or limited; those of extensions of users are texts."""
+
+
+class Goals(ABC):
+    """Methods that add objectives and limits; each returns a new problem."""
+
+    @abstractmethod
+    def _with_goal(self, key: str, keys: Table, adds: bool) -> Self: ...
+
+    def minimise(
+        self, minimise: QuantityName | None = None, *, mounts: Sequence[str] | None = None,
+        bearings: Sequence[str] | None = None, cylinders: Sequence[str] | None = None,
+        sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
+        operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
+        direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+        motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
+        wanted: Number | None = None, frequency: Value | None = None, terms: Sequence[Table] | None = None,
+    ) -> Self:
+        """Return the problem with this objective, in place of earlier ones.
+
+        Parameters
+        ----------
+        minimise
+            What is to be least.
+        mounts
+            Names of the mounts that count; all by default.
+        bearings
+            Names of the main bearings that count; all by default.
+        cylinders
+            Names of the cylinders that count; all by default.
+        sections
+            Sections of the crankshaft that count, named after the discs that they join; all by default.
+        webs
+            Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
+        operating_points
+            Names of the operating points that count; all by default.
+        orders
+            Orders that count, as multiples of crank speed; all by default.
+        alternating
+            Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no
+            part.
+        direction_weights
+            Weights of the components along x, y and z.
+        load_cases
+            Load cases that count, by name; all by default.
+        motions
+            Motions that should have a mode of their own; all by default.
+        wanted
+            Share of a motion in a mode of its own that is enough; 1 by default.
+        frequency
+            Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out [Hz].
+        terms
+            Weighted quantities whose sum is to be least.
+        """
+        return self._with_goal("objective", locals(), False)
+
+    def then_minimise(
+        self, minimise: QuantityName | None = None, *, mounts: Sequence[str] | None = None,
+        bearings: Sequence[str] | None = None, cylinders: Sequence[str] | None = None,
+        sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
+        operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
+        direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+        motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
+        wanted: Number | None = None, frequency: Value | None = None, terms: Sequence[Table] | None = None,
+        within: Number | None = None,
+    ) -> Self:
+        """Return the problem with one more objective, among the designs that are best by earlier ones.
+
+        Parameters
+        ----------
+        minimise
+            What is to be least.
+        mounts
+            Names of the mounts that count; all by default.
+        bearings
+            Names of the main bearings that count; all by default.
+        cylinders
+            Names of the cylinders that count; all by default.
+        sections
+            Sections of the crankshaft that count, named after the discs that they join; all by default.
+        webs
+            Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
+        operating_points
+            Names of the operating points that count; all by default.
+        orders
+            Orders that count, as multiples of crank speed; all by default.
+        alternating
+            Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no
+            part.
+        direction_weights
+            Weights of the components along x, y and z.
+        load_cases
+            Load cases that count, by name; all by default.
+        motions
+            Motions that should have a mode of their own; all by default.
+        wanted
+            Share of a motion in a mode of its own that is enough; 1 by default.
+        frequency
+            Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out [Hz].
+        terms
+            Weighted quantities whose sum is to be least.
+        within
+            Share by which the objective before this one may exceed its least value.
+        """
+        return self._with_goal("objective", locals(), True)
+
+    def limit(
+        self, limit: QuantityName, *, mounts: Sequence[str] | None = None, bearings: Sequence[str] | None = None,
+        cylinders: Sequence[str] | None = None, sections: Sequence[str] | None = None,
+        webs: Sequence[str] | None = None, operating_points: Sequence[str] | None = None, orders: Values | None = None,
+        alternating: bool | None = None, direction_weights: Values | None = None,
+        load_cases: Sequence[str] | None = None,
+        motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
+        wanted: Number | None = None, frequency: Value | None = None, max: Number | None = None,
+        min: Number | None = None, outside: Values | None = None, name: str | None = None,
+        of: Sequence[str] | None = None,
+    ) -> Self:
+        """Return the problem with one more limit.
+
+        Parameters
+        ----------
+        limit
+            What is limited.
+        mounts
+            Names of the mounts that count; all by default.
+        bearings
+            Names of the main bearings that count; all by default.
+        cylinders
+            Names of the cylinders that count; all by default.
+        sections
+            Sections of the crankshaft that count, named after the discs that they join; all by default.
+        webs
+            Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
+        operating_points
+            Names of the operating points that count; all by default.
+        orders
+            Orders that count, as multiples of crank speed; all by default.
+        alternating
+            Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no
+            part.
+        direction_weights
+            Weights of the components along x, y and z.
+        load_cases
+            Load cases that count, by name; all by default.
+        motions
+            Motions that should have a mode of their own; all by default.
+        wanted
+            Share of a motion in a mode of its own that is enough; 1 by default.
+        frequency
+            Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out [Hz].
+        max
+            Largest value allowed, in the unit of the quantity.
+        min
+            Smallest value allowed, of natural frequencies, decoupling, sag or distance.
+        outside
+            Band in which no natural frequency or critical speed may lie.
+        name
+            Name in tables, pictures and messages.
+        of
+            Names of the counterweights or balancers whose mass counts, or of shafts.
+        """
+        return self._with_goal("constraints", locals(), True)

@@ -1,0 +1,1 @@
+"""Python as engineers write it: engines and problems in code, results in notebooks."""

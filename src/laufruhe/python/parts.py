@@ -1,0 +1,652 @@
+"""Parts and settings of an engine in code.
+
+`python tests/schemas.py` makes this file of the models of problem files.
+"""
+# fmt: off
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, Self
+
+from laufruhe.problem.number_types import Array, Number, Table, Value, Values
+from laufruhe.python.keys import Parts, keys_of
+
+
+class EngineParts(Parts):
+    """Methods that add a table of a problem file to an engine; each returns a new engine."""
+
+    def quantities(
+        self, *, stroke_over_bore: Value | None = None,
+    ) -> Self:
+        """Return the engine with quantities.
+
+        Numbers that several numbers of the file follow.
+
+        Parameters
+        ----------
+        stroke_over_bore
+            Ratio of stroke to bore; both follow at the displacement that engine.stroke and engine.bore give.
+        """
+        return self._with("quantities", "quantities", keys_of(locals()))
+
+    def phasing(
+        self, *, phases: int | None = None, intervals: Table | None = None, best: int | None = None,
+        rank_orders_by: Sequence[Literal["roll moment", "neighbours", "longest gap"]] | None = None,
+        most_shafts: int | None = None, most_shaft_mass: Number | None = None, time_limit: Number | None = None,
+        method: Literal["auto", "search", "program", "enumeration"] | None = None,
+    ) -> Self:
+        """Return the engine with phasing.
+
+        Search of open throws, firing orders and shafts.
+
+        Parameters
+        ----------
+        phases
+            Equal steps of a turn on which throws may stand; by default those of even firing.
+        intervals
+            Bounds on firing intervals; even firing by default.
+        best
+            Number of crank stars in the ranking.
+        rank_orders_by
+            What ranks the firing orders of a star; the first counts most.
+        most_shafts
+            Largest number of optional balancer shafts that are built.
+        most_shaft_mass
+            Largest mass of the optional shafts that are built [kg].
+        time_limit
+            Time after which the search ends with the best design so far [s].
+        method
+            How stars are searched.
+        """
+        return self._with("phasing", "phasing", keys_of(locals()))
+
+    def operating_point(
+        self, name: str | None = None, *, speed: Value | None = None, mean_piston_speed: Value | None = None,
+        imep: Value | None = None, bmep: Value | None = None, brake_torque: Value | None = None,
+        motored: bool | None = None, gas: bool | None = None, up_to: Value | None = None, steps: int | None = None,
+        weight: Value | None = None,
+    ) -> Self:
+        """Return the engine with an operating point.
+
+        Speeds and loads at which the engine is looked at.
+
+        Parameters
+        ----------
+        name
+            Name in tables, pictures and messages.
+        speed
+            Speed of the crank [rad/s].
+        mean_piston_speed
+            Twice the stroke for every turn of the crank [m/s].
+        imep
+            Indicated mean effective pressure at this point, in place of that of [gas] [Pa].
+        bmep
+            Brake mean effective pressure; [friction] adds what friction takes, and its uncertainty [Pa].
+        brake_torque
+            Torque at the brake, in place of bmep [N m].
+        motored
+            The charge is compressed without combustion.
+        gas
+            false: no gas at this point.
+        up_to
+            Highest speed of a range that starts at speed [rad/s].
+        steps
+            Number of speeds in the range.
+        weight
+            How much it counts beside the others.
+        """
+        return self._with("operating_points", "operating_point", keys_of(locals()))
+
+    def gas_seiliger(
+        self, *, peak_pressure: Value, imep: Value, compression_ratio: Value | None = None,
+        intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
+        crankcase_pressure: Value | None = None, compression_exponent: Value | None = None,
+        expansion_exponent: Value | None = None,
+    ) -> Self:
+        """Return the engine with gas seiliger.
+
+        Pressure in the cylinders; without it no gas is computed.
+
+        Parameters
+        ----------
+        peak_pressure
+            Largest absolute pressure of the cycle [Pa].
+        imep
+            Indicated mean effective pressure [Pa].
+        compression_ratio
+            Largest over smallest volume of the cylinder.
+        intake_pressure
+            Absolute pressure of the intake stroke [Pa].
+        exhaust_pressure
+            Absolute pressure of the exhaust stroke [Pa].
+        crankcase_pressure
+            Absolute pressure behind the piston [Pa].
+        compression_exponent
+            Polytropic exponent of the compression.
+        expansion_exponent
+            Polytropic exponent of the expansion.
+        """
+        return self._with("gas", "gas_seiliger", keys_of(locals(), {'model': 'seiliger'}))
+
+    def gas_wiebe(
+        self, *, imep: Value, start: Value, duration: Value, compression_ratio: Value | None = None,
+        intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
+        crankcase_pressure: Value | None = None, shape: Value | None = None, completeness: Value | None = None,
+        heat_ratio: Value | None = None,
+    ) -> Self:
+        """Return the engine with gas wiebe.
+
+        Pressure in the cylinders; without it no gas is computed.
+
+        Parameters
+        ----------
+        imep
+            Indicated mean effective pressure [Pa].
+        start
+            Crank angle at which the burn starts, after the dead centre [rad].
+        duration
+            Crank angle from the start of the burn to its end [rad].
+        compression_ratio
+            Largest over smallest volume of the cylinder.
+        intake_pressure
+            Absolute pressure of the intake stroke [Pa].
+        exhaust_pressure
+            Absolute pressure of the exhaust stroke [Pa].
+        crankcase_pressure
+            Absolute pressure behind the piston [Pa].
+        shape
+            Exponent m of the Wiebe function.
+        completeness
+            Share of the heat that is burnt at the end of the burn.
+        heat_ratio
+            Ratio of the specific heats of the gas.
+        """
+        return self._with("gas", "gas_wiebe", keys_of(locals(), {'model': 'wiebe'}))
+
+    def gas_trace(
+        self, *, file: str, sheet: str | None = None, angle_column: str | int | None = None,
+        pressure_column: str | int | Sequence[str | int] | None = None, angle_unit: str | None = None,
+        pressure_unit: str | None = None, gauge: bool | None = None, peg: Table | None = None,
+        cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
+        angle_zero: Number | None = None, crankcase_pressure: Value | None = None,
+    ) -> Self:
+        """Return the engine with gas trace.
+
+        Pressure in the cylinders; without it no gas is computed.
+
+        Parameters
+        ----------
+        file
+            Text file, .xlsx or .mat file of crank angle and pressure, beside the problem.
+        sheet
+            Sheet of a spreadsheet; by default that with the most rows of numbers.
+        angle_column
+            Name or number of the column of crank angles, if it is not evident.
+        pressure_column
+            Name or number of the column of pressures, or several that are cycles of the cylinder.
+        angle_unit
+            Unit of the angles, if it is not in the file; deg by default.
+        pressure_unit
+            Unit of the pressures, if it is not in the file; bar by default.
+        gauge
+            true: pressures count from crankcase_pressure. By default they are absolute.
+        peg
+            Moves a floating pressure to a known one, at one angle.
+        cycles
+            Of several cycles: their mean, the one with the highest pressure, or that with this number.
+        smooth
+            false keeps the noise of the measurement.
+        angle_zero
+            Crank angle after firing at which the file counts zero, or its dead centre: "firing" or "gas exchange".
+        crankcase_pressure
+            Absolute pressure behind the piston [Pa].
+        """
+        return self._with("gas", "gas_trace", keys_of(locals(), {'model': 'trace'}))
+
+    def gas_chambers(
+        self, *, chambers: Sequence[Table], crankcase_pressure: Value | None = None,
+    ) -> Self:
+        """Return the engine with gas chambers.
+
+        Pressure in the cylinders; without it no gas is computed.
+
+        Parameters
+        ----------
+        chambers
+            A space on one side of a piston, or of a further piston on the same rod.
+        crankcase_pressure
+            Absolute pressure of the ambient air [Pa].
+        """
+        return self._with("gas", "gas_chambers", keys_of(locals(), {'model': 'chambers'}))
+
+    def friction(
+        self, *, file: str | None = None, kind: Literal["fuel", "motoring"] | None = None,
+        speed_unit: str | None = None, load_unit: str | None = None, fmep: Number | None = None,
+        deviation: Number | None = None, deviations: Number | None = None,
+    ) -> Self:
+        """Return the engine with friction.
+
+        Friction mean effective pressure, measured in a CSV file or given, with its uncertainty.
+
+        Parameters
+        ----------
+        file
+            CSV file: speed, load and fuel for kind fuel; speed and drag for kind motoring.
+        kind
+            What the file holds: fuel burnt over load, or drag of the motored engine.
+        speed_unit
+            Unit of the speed in the file.
+        load_unit
+            Unit of the load in the file: of a torque, or of a mean pressure.
+        fmep
+            Friction mean effective pressure, in place of a file [Pa].
+        deviation
+            Standard deviation of fmep [Pa].
+        deviations
+            Number of standard deviations to either side for which the load is computed.
+        """
+        return self._with("friction", "friction", keys_of(locals()))
+
+    def mounts(
+        self, *, kind: Literal["rigid", "elastic"] | None = None, positions: Sequence[Values] | Array | None = None,
+        names: Sequence[str] | None = None, relative_stiffness: Values | None = None, stiffness: Values | None = None,
+        loss_factor: Value | None = None, damping_per_stiffness: Value | None = None, stop: Table | None = None,
+        places: Sequence[Table] | None = None,
+    ) -> Self:
+        """Return the engine with mounts.
+
+        How the engine is held.
+
+        Parameters
+        ----------
+        kind
+            Whether the mounts give way: rigid far above their resonances, or elastic.
+        positions
+            Where the mounts are: x forward, y to the left, z up, for each [m].
+        names
+            Names of the mounts, in the order of their positions.
+        relative_stiffness
+            Relative stiffness along x, y, z of every mount that gives none; not for elastic mounts.
+        stiffness
+            Stiffness along x, y, z of every elastic mount that gives none [N/m].
+        loss_factor
+            Loss factor of every elastic mount that gives none.
+        damping_per_stiffness
+            Viscous damping over stiffness of every elastic mount that gives none [s].
+        stop
+            Bump stop along each of the mount's own axes; it acts in run-ups and load cases.
+        places
+            The mounts, a table each.
+        """
+        return self._with("mounts", "mounts", keys_of(locals()))
+
+    def block(
+        self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None,
+        inertia_products: Values | None = None, turning_inertia: Value | None = None,
+    ) -> Self:
+        """Return the engine with block.
+
+        The rigid body that elastic mounts carry.
+
+        Parameters
+        ----------
+        mass
+            Mass of everything that the mounts carry, moving parts included [kg].
+        inertia
+            Moments of inertia about x, y and z through the centre of gravity [kg m^2].
+        centre_of_gravity
+            Centre of gravity of everything that the mounts carry: x forward, y to the left, z up [m].
+        inertia_products
+            Products of inertia xy, xz, yz of the tensor: xy = - integral of x y dm [kg m^2].
+        turning_inertia
+            Part of the inertia about x that turns with the crank and does not roll with the block: crankshaft, flywheel
+            [kg m^2].
+        """
+        return self._with("block", "block", keys_of(locals()))
+
+    def load_case(
+        self, name: str, *, times_weight: Values | None = None, torque: Value | None = None,
+        force: Values | None = None, place: Values | None = None,
+    ) -> Self:
+        """Return the engine with a load case.
+
+        Static load: weight, a bump, a torque. Travel counts from the position of the engine without it.
+
+        Parameters
+        ----------
+        name
+            Name in tables, pictures and messages.
+        times_weight
+            The weight of the block, so many times along x, y and z.
+        torque
+            Moment about x, as that of the crank on the block [N m].
+        force
+            A force along x, y and z [N].
+        place
+            Where the force acts [m].
+        """
+        return self._with("load_cases", "load_case", keys_of(locals()))
+
+    def main_bearing(
+        self, name: str | None = None, *, x: Value | None = None, beside_throws: Value | None = None,
+        shaft: str | None = None, diameter: Value | None = None, width: Value | None = None,
+        friction: Value | None = None,
+    ) -> Self:
+        """Return the engine with a main bearing.
+
+        Bearings of the crankshaft in the block.
+
+        Parameters
+        ----------
+        name
+            Name of the bearing; by default its number from the front.
+        x
+            Place along the shaft [m].
+        beside_throws
+            In place of x, a bearing in the middle between neighbouring throws, and one so far beyond either end [m].
+        shaft
+            The shaft that it stands on, by name.
+        diameter
+            Diameter of the journal; needed for a pressure and for friction power [m].
+        width
+            Width of the journal; needed for a pressure [m].
+        friction
+            Coefficient of friction; needed for friction power.
+        """
+        return self._with("main_bearings", "main_bearing", keys_of(locals()))
+
+    def flywheel(
+        self, *, inertia: Value | None = None, rim: Table | None = None, crankshaft_inertia: Value | None = None,
+    ) -> Self:
+        """Return the engine with flywheel.
+
+        Parts that turn at crank speed, without pistons and rods.
+
+        Parameters
+        ----------
+        inertia
+            Moment of inertia of the whole flywheel, in place of a rim [kg m^2].
+        rim
+            The flywheel by its rim, in place of its inertia.
+        crankshaft_inertia
+            Moment of inertia of the crankshaft and all else that turns, beside a rim [kg m^2].
+        """
+        return self._with("flywheel", "flywheel", keys_of(locals()))
+
+    def geared_inertia(
+        self, name: str, *, share: Value, ratio: Number | None = None,
+    ) -> Self:
+        """Return the engine with a geared inertia.
+
+        A second crank, or a flywheel on a shaft of its own.
+
+        Parameters
+        ----------
+        name
+            Name in tables, pictures and messages.
+        share
+            Share of the inertia of all that turns, reduced to the crank.
+        ratio
+            Speed over crank speed; negative runs against the crank.
+        """
+        return self._with("geared_inertias", "geared_inertia", keys_of(locals()))
+
+    def counterweight(
+        self, name: str, *, shaft: str | None = None, balance_factor: Value | None = None,
+        balance_fraction: Value | None = None, throws: Sequence[int] | None = None, x: Value | None = None,
+        opposite_throw: int | None = None, unbalance: Value | complex | None = None,
+        mass: Value | complex | None = None, radius: Value | None = None, angle: Value | None = None,
+    ) -> Self:
+        """Return the engine with a counterweight.
+
+        Weights on the crankshaft.
+
+        Parameters
+        ----------
+        name
+            Name in tables, pictures and messages.
+        shaft
+            Shaft that it turns with; "every" puts a balance factor opposite the throws of all shafts.
+        balance_factor
+            Share of the reciprocating mass that is balanced, with the rotating mass, opposite each throw.
+        balance_fraction
+            Earlier name of balance_factor.
+        throws
+            Numbers of the throws that carry one.
+        x
+            Place along the crank, forward of the middle of the engine [m].
+        opposite_throw
+            Number of the throw from which angle and place are counted.
+        unbalance
+            Mass times the distance of its centre of gravity from the axis of rotation [kg m].
+        mass
+            Mass [kg].
+        radius
+            Distance of its centre of gravity from the axis of rotation [m].
+        angle
+            Angle at which it stands when cylinder 1 is at its firing dead centre, from upright in the sense of rotation
+            [rad].
+        """
+        return self._with("counterweights", "counterweight", keys_of(locals()))
+
+    def balancer_shaft(
+        self, name: str, *, ratio: Number, position: Values, unbalances: Sequence[Table], optional: bool | None = None,
+        shaft_mass: Value | None = None,
+    ) -> Self:
+        """Return the engine with a balancer shaft.
+
+        Shafts with weights that turn beside the crankshaft.
+
+        Parameters
+        ----------
+        name
+            Name in tables, pictures and messages.
+        ratio
+            Speed over crank speed; negative turns against the crank.
+        position
+            Position of the axis: y to the left, z up [m].
+        unbalances
+            Unbalance of a shaft.
+        optional
+            Whether the shaft is built is decided too.
+        shaft_mass
+            Mass of an optional shaft without its unbalances [kg].
+        """
+        return self._with("balancer_shafts", "balancer_shaft", keys_of(locals()))
+
+    def fidelity(
+        self, *, kinematics: Literal["exact", "two-order", "auto"] | None = None, tolerance: Number | None = None,
+        rod: Literal["rigid", "mass-only"] | None = None, gas: bool | None = None, gas_samples: int | None = None,
+        gas_orders: int | None = None, orders: int | None = None, crank_inertia: Number | None = None,
+        crankshaft: Literal["cut", "beam"] | None = None, mounts: Literal["frequency", "rigid", "time"] | None = None,
+        modes: Sequence[int] | None = None, samples: int | None = None,
+    ) -> Self:
+        """Return the engine with fidelity.
+
+        Fidelity of the physics; exact by default.
+
+        Parameters
+        ----------
+        kinematics
+            Motion of the pistons; auto is exact, and takes fewer samples for many designs.
+        tolerance
+            Relative error of the objective that auto may make.
+        rod
+            Whether the rod is a rigid body, or two masses without its inertia.
+        gas
+            false leaves the working gas out.
+        gas_samples
+            Steps of the gas torque over the working cycle.
+        gas_orders
+            Last order kept of the gas alone.
+        orders
+            Last order kept of pistons, rods and gas.
+        crank_inertia
+            Inertia of all that turns with the crank; its speed varies within the cycle [kg m^2].
+        crankshaft
+            How main bearings share its loads: cut in its journals, or a continuous beam.
+        mounts
+            Elastic mounts order by order, as if they gave no way, or integrated in time.
+        modes
+            Natural modes that answer, 1 the lowest.
+        samples
+            Steps over the working cycle.
+        """
+        return self._with("fidelity", "fidelity", keys_of(locals()))
+
+    def search(
+        self, *, starts: int | None = None, seed: int | None = None, boxes: int | None = None,
+    ) -> Self:
+        """Return the engine with search.
+
+        Settings of searches for problems that are not convex.
+
+        Parameters
+        ----------
+        starts
+            The most points that a search starts from where the problem is not convex; it ends sooner once no further
+            optimum is to be expected.
+        seed
+            Start of the random numbers: the same seed gives the same numbers.
+        boxes
+            Number of boxes into which bounds may be divided for a proof; 0 for none.
+        """
+        return self._with("search", "search", keys_of(locals()))
+
+    def tolerances(
+        self, *, residual_unbalance: str | None = None, rotor_mass: Number | None = None, planes: int | None = None,
+        law: Literal["uniform", "normal"] | None = None,
+    ) -> Self:
+        """Return the engine with tolerances.
+
+        Tolerances of built engines that no number of the drawing has.
+
+        Parameters
+        ----------
+        residual_unbalance
+            Left on the crankshaft by balancing: an unbalance on each plane, or a grade of ISO 21940-11 for all of them
+            together.
+        rotor_mass
+            Mass of the rotor that has the grade: crankshaft, flywheel, clutch [kg].
+        planes
+            Number of balancing planes, from the first throw to the last.
+        law
+            Distribution of the errors within the tolerance.
+        """
+        return self._with("tolerances", "tolerances", keys_of(locals()))
+
+    def robust(
+        self, *, over: str | None = None, engines: int | None = None, seed: int | None = None,
+    ) -> Self:
+        """Return the engine with robust.
+
+        Design for engines as built: for the worst case within the tolerances, or for a share of them.
+
+        Parameters
+        ----------
+        over
+            "worst case", or a share of engines such as "95 %".
+        engines
+            Number of engines that are drawn.
+        seed
+            Start of the random numbers: the same seed gives the same numbers.
+        """
+        return self._with("robust", "robust", keys_of(locals()))
+
+    def assembly(
+        self, *, pistons: str | None = None, rods: str | None = None, mass_unit: str | None = None,
+    ) -> Self:
+        """Return the engine with assembly.
+
+        Measured pistons and rods; the optimiser decides which goes into which cylinder.
+
+        Parameters
+        ----------
+        pistons
+            CSV file with the mass of each piston.
+        rods
+            CSV file with the masses of each rod at the small end and at the big end.
+        mass_unit
+            Unit of the masses in these files.
+        """
+        return self._with("assembly", "assembly", keys_of(locals()))
+
+    def run_up(
+        self, *, up_to: Value, time: Value | None = None, shut_down_time: Value | None = None,
+        operating_point: str | None = None,
+    ) -> Self:
+        """Return the engine with run up.
+
+        Run from rest to a speed and back, through resonance.
+
+        Parameters
+        ----------
+        up_to
+            Highest speed [rad/s].
+        time
+            Time in which the engine runs up from rest [s].
+        shut_down_time
+            Time in which the engine is shut down; by default that of the run-up [s].
+        operating_point
+            Operating point whose gas drives the engine during the run; the slowest by default.
+        """
+        return self._with("run_up", "run_up", keys_of(locals()))
+
+    def running_gear(
+        self, *, density: Value | None = None, elastic_modulus: Value | None = None, webs: Table | None = None,
+        rod: Table | None = None, piston_pin: Table | None = None, bolts: Table | None = None,
+    ) -> Self:
+        """Return the engine with running gear.
+
+        Sizes of webs, rods, bolts and piston pins, from which their stresses follow.
+
+        Parameters
+        ----------
+        density
+            Density of the parts; their masses and those of the crank pins are then added to those of [engine] [kg/m^3].
+        elastic_modulus
+            Young's modulus of rods and piston pins [Pa].
+        webs
+            Webs beside every crank pin.
+        rod
+            The round shank of every rod.
+        piston_pin
+            The pin of every piston.
+        bolts
+            Bolts of every big end.
+        """
+        return self._with("running_gear", "running_gear", keys_of(locals()))
+
+    def torsion(
+        self, *, throw_inertia: Value | Values, cylinder_damping: Value | Values | None = None,
+        loss_factor: Value | None = None, shear_modulus: Value | None = None, speeds: Values | None = None,
+        output: str | None = None, crank: Table | None = None, discs: Sequence[Table] | None = None,
+        absorbers: Sequence[Table] | None = None,
+    ) -> Self:
+        """Return the engine with torsion.
+
+        Discs and shafts of the torsional system of the crankshaft.
+
+        Parameters
+        ----------
+        throw_inertia
+            Moment of inertia of a throw: pin, webs and counterweights, without rod and piston [kg m^2].
+        cylinder_damping
+            Viscous damping of every throw against the block [N m s/rad].
+        loss_factor
+            Hysteretic loss factor of every shaft that has none of its own.
+        shear_modulus
+            Shear modulus of the crankshaft [Pa].
+        speeds
+            Range of speeds in which the response is shown and barred speeds are looked for [rad/s].
+        output
+            Disc at which the driven machine takes its torque; the last one by default.
+        crank
+            The shaft from throw to throw.
+        discs
+            Discs before and behind the throws, from the front.
+        absorbers
+            A viscous or rubber damper, or a pendulum.
+        """
+        return self._with("torsion", "torsion", keys_of(locals()))
