@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[2]
 PICTURE = ROOT / "docs" / "pictures" / "architecture.svg"
 WORDS = {
     "cli": "commands",
+    "python": "engines in code",
     "report": "pages, tables, pictures",
     "live": "what a page shows while numbers move",
     "studies": "sweeps and comparisons",

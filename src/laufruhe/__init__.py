@@ -40,15 +40,17 @@ if TYPE_CHECKING:
         x_engine,
     )  # fmt: skip
     from laufruhe.python.lists import engines, examples
+    from laufruhe.python.results import Result
+    from laufruhe.python.watch import Callback, Progress, ProgressLine
     from laufruhe.report.saved_result import SavedResult, read_result, write_result
-    from laufruhe.solvers.result import Result
 
 _LAYOUTS = ("boxer", "delta", "engine", "inline", "opposed_piston", "parts", "radial", "rotary", "vee", "x_engine")
 # imported at first use, so that import laufruhe is quick
 _ELSEWHERE = {
     "EngineDraft": "laufruhe.python.draft",
     "Problem": "laufruhe.problem.problem",
-    "Result": "laufruhe.solvers.result",
+    "Result": "laufruhe.python.results",
+    **dict.fromkeys(("Progress", "ProgressLine"), "laufruhe.python.watch"),
     **dict.fromkeys(_LAYOUTS, "laufruhe.python.layouts"),
     **dict.fromkeys(("engines", "examples"), "laufruhe.python.lists"),
     **dict.fromkeys(("SavedResult", "read_result", "write_result"), "laufruhe.report.saved_result"),
@@ -62,6 +64,8 @@ __all__ = [
     "LaufruheError",
     "ModelError",
     "Problem",
+    "Progress",
+    "ProgressLine",
     "Result",
     "SavedResult",
     "SolverError",
@@ -146,7 +150,7 @@ def load(source: Source) -> Problem:
 
 
 @_on_one_thread
-def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
+def solve(problem: Problem | Source, time_limit: float | None = None, callback: Callback | None = None) -> Result:
     """Solve a problem; the result includes its proof.
 
     Parameters
@@ -155,6 +159,9 @@ def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
         Problem, or an argument of `load`.
     time_limit
         Seconds after which the search ends with its best design and bound.
+    callback
+        Function of the `Progress` of the search; if it returns True, the search ends with its best design and bound.
+        `ProgressLine()` shows the progress.
 
     Raises
     ------
@@ -168,15 +175,19 @@ def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
     from dataclasses import replace
     from numbers import Real
 
+    from laufruhe.python.results import watched
     from laufruhe.solvers import solve as decide
 
     if time_limit is not None and not (isinstance(time_limit, Real) and time_limit > 0.0):
         raise wrong_call("time_limit", time_limit, "must be a number of seconds above zero", "try 60")
-    return decide(replace(_problem(problem), sharply=True), time_limit=time_limit, diagnose=True)
+    checked = replace(_problem(problem), sharply=True)
+    return watched(checked, callback, lambda watch: decide(checked, watch, time_limit, diagnose=True))
 
 
 @_on_one_thread
-def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint] = ()) -> Result:
+def evaluate(
+    design: Problem | Engine | Source, points: Sequence[OperatingPoint] = (), values: Mapping[str, Any] | None = None
+) -> Result:
     """Evaluate a design as given.
 
     Parameters
@@ -185,6 +196,8 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
         Problem, argument of `load`, or engine.
     points
         Operating points; required when `design` is an Engine.
+    values
+        Other values of numbers, as `Problem.with_values` takes them.
 
     Raises
     ------
@@ -194,14 +207,16 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
         If the engine cannot be evaluated, or has no operating point.
     """
     from laufruhe.machine import Engine
+    from laufruhe.python.results import python_result
     from laufruhe.solvers import evaluate_only
 
     if isinstance(design, Engine):
-        return evaluate_only(_engine_problem(design, points))
+        return python_result(evaluate_only(_engine_problem(design, points)))
     if len(points):
         rule, remedy = "stand beside a problem, which has its own", "leave them out, or give the problem's engine"
         raise wrong_call("points", points, rule, remedy)
-    return evaluate_only(_problem(design))
+    problem = _problem(design)
+    return python_result(evaluate_only(problem if values is None else problem.with_values(values)))
 
 
 def _engine_problem(design: Engine, points: Sequence[OperatingPoint]) -> Problem:

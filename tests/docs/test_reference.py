@@ -13,8 +13,8 @@ import pytest
 import laufruhe
 from laufruhe.files.ready import copies
 from laufruhe.problem.problem import Problem
+from laufruhe.python.results import Result
 from laufruhe.report.saved_result import SavedResult
-from laufruhe.solvers.result import Result
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
 

@@ -19,7 +19,7 @@ from typing import Any, TextIO, TypeAlias
 import typer
 
 from laufruhe.errors import Complaint, InputError, LaufruheWarning, ModelError, SolverError, printed, refused
-from laufruhe.numerics.progress import Step
+from laufruhe.numerics.progress import SearchState, Step
 
 QUIET, PLAIN, VERBOSE = -1, 0, 1
 _loudness: ContextVar[int] = ContextVar("loudness", default=PLAIN)
@@ -249,33 +249,19 @@ def pace() -> float:
 
 
 class Watched:
-    """Listener that reports progress of searches, with the best value, its bound and the gap.
-
-    For nested searches, the value is that of the outermost search with a value.
-    """
+    """Listener that reports progress of searches at a pace."""
 
     def __init__(self, say: Callable[[str], None], unit: str) -> None:
         self._say, self._unit = say, unit
-        self._known: dict[int, Step] = {}
+        self._state = SearchState()
         self._next = 0.0
 
     def __call__(self, step: Step) -> None:
         """Report a step, unless the last report was a moment ago."""
-        depth = len(step.within)
-        self._known = {at: known for at, known in self._known.items() if at < depth} | {depth: step}
-        if time.monotonic() >= self._next:
+        self._state.add(step)
+        if step.design is None and time.monotonic() >= self._next:
             self._next = time.monotonic() + pace()
-            valued = next((known for known in self._known.values() if math.isfinite(known.value)), step)
-            count = f"{step.done} of {step.whole}" if step.whole else f"{step.done}" if step.done else ""
-            self._say(", ".join([*step.within, f"{step.what}: {count}" if count else step.what, *self._values(valued)]))
+            # imported while a search runs, because commands should answer at once
+            from laufruhe.present.progress_text import progress_text
 
-    def _values(self, step: Step) -> Iterator[str]:
-        from laufruhe.present.numbers import figure
-        from laufruhe.prove.certificate import USELESS_GAP
-
-        if math.isfinite(step.value):
-            yield f"best {figure(step.value, self._unit)}"
-        if math.isfinite(step.bound) and step.bound > 0.0:
-            yield f"bound {figure(step.bound, self._unit)}"
-        if step.gap < USELESS_GAP:
-            yield f"gap {100.0 * step.gap:.2g} %"
+            self._say(progress_text(step, self._state.valued, self._unit))

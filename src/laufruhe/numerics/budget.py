@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from threading import Event
 from typing import TypeVar
 
 T = TypeVar("T")
+# true once the caller has ended the work, whatever deadlines its parts have
+_ended: ContextVar[Event | None] = ContextVar("ended", default=None)
 # deadline on the monotonic clock [s]
 _until: ContextVar[float] = ContextVar("until", default=math.inf)
 
@@ -26,6 +29,17 @@ def limit_time(seconds: float | None) -> Iterator[None]:
 
 
 @contextmanager
+def stoppable() -> Iterator[Callable[[], None]]:
+    """Yield a function that ends the work in the block now, as a deadline does."""
+    event = Event()
+    before = _ended.set(event)
+    try:
+        yield event.set
+    finally:
+        _ended.reset(before)
+
+
+@contextmanager
 def minimum_time(seconds: float) -> Iterator[None]:
     """Give the work in the block at least some seconds, even beyond the enclosing limit."""
     before = _until.set(max(_until.get(), time.monotonic() + seconds))
@@ -36,7 +50,10 @@ def minimum_time(seconds: float) -> Iterator[None]:
 
 
 def seconds_left() -> float:
-    """Return the seconds until the deadline; infinite without a limit."""
+    """Return the seconds until the deadline; infinite without a limit, negative once the work is ended."""
+    event = _ended.get()
+    if event is not None and event.is_set():
+        return -1.0
     return _until.get() - time.monotonic()
 
 

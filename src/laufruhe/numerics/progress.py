@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -26,6 +26,8 @@ class Step:
         Number of finished pieces and of all pieces; `whole` is zero if the total is unknown.
     value, bound
         Best value and lower bound so far, in the unit of the objective; infinite where not known.
+    design
+        Values of decisions by name [SI], if the step reports a feasible design and not the state of a search.
     """
 
     within: tuple[str, ...]
@@ -34,12 +36,35 @@ class Step:
     whole: int = 0
     value: float = math.inf
     bound: float = -math.inf
+    design: Mapping[str, complex] | None = None
 
     @property
     def gap(self) -> float:
         """Relative gap between value and bound; NaN where either is not known, or the value is zero."""
         is_known = math.isfinite(self.value) and math.isfinite(self.bound) and self.value
         return max(self.value - self.bound, 0.0) / abs(self.value) if is_known else math.nan
+
+
+class SearchState:
+    """Last steps of nested searches, one for each depth, and the last feasible design."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, Step] = {}
+        self.design: Step | None = None
+
+    def add(self, step: Step) -> None:
+        """Take a step into account."""
+        if step.design is not None:
+            self.design = step
+            return
+        depth = len(step.within)
+        self._known = {at: known for at, known in self._known.items() if at < depth} | {depth: step}
+
+    @property
+    def valued(self) -> Step:
+        """Last step of the outermost search that knows a value; the last step of all if none does."""
+        known = list(self._known.values())
+        return next((step for step in known if math.isfinite(step.value)), known[-1] if known else Step((), ""))
 
 
 Listener: TypeAlias = Callable[[Step], None]
@@ -74,6 +99,13 @@ def report_progress(
     listener = _listener.get()
     if listener is not None:
         listener(Step(_within.get(), what, done, whole, value, bound))
+
+
+def report_design(value: float, names: Iterable[str], values: Iterable[complex]) -> None:
+    """Send a feasible design with its objective to the listener, if there is one."""
+    listener = _listener.get()
+    if listener is not None:
+        listener(Step(_within.get(), "evaluated design", value=value, design=dict(zip(names, values, strict=True))))
 
 
 def with_progress(what: str, items: Sequence[T]) -> Iterator[T]:

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from laufruhe.errors import refused
 from laufruhe.numerics.processes import fork_map
 from laufruhe.plots.letters import prepare
+from laufruhe.plots.style import as_svg as as_svg
 from laufruhe.plots.style import save, save_and_show
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result

@@ -107,10 +107,10 @@ class EngineDraft(EngineParts, Mapping[str, Any]):
         points = [{"speed": point} if not isinstance(point, Mapping) else dict(point) for point in points]
         goal = {"minimise": minimise} if isinstance(minimise, str) else minimise
         first = {"title": title or self.title, "source": source, "assumptions": list(assumptions) or None}
-        given = plain(keys_of({"operating_points": points, "objective": goal, "tolerance": tolerance}), DEEPEST)
-        given["operating_points"] = [*self.get("operating_points", ()), *given["operating_points"]]
+        called = plain(keys_of({"operating_points": points, "objective": goal, "tolerance": tolerance}), DEEPEST)
+        called["operating_points"] = [*self.get("operating_points", ()), *called["operating_points"]]
         with errors_in_file(name):
-            new = {key: written(value, (key,), given) for key, value in given.items()}
+            new = {key: written(value, (key,), called) for key, value in called.items()}
         return load_tables(tables_and_path(keys_of({**first, **self.tables, **new}))[0], Path(name))
 
     def to_toml(self) -> str:

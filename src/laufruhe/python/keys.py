@@ -17,8 +17,7 @@ def keys_of(arguments: Mapping[str, Any], fixed: Mapping[str, Any] | None = None
 
 
 class Parts(ABC):
-    """Base of generated methods that add tables."""
+    """Base of generated methods that add tables: the method `name` at a key of the file, plural for lists."""
 
     @abstractmethod
-    def _with(self, key: str, name: str, table: Mapping[str, Any]) -> Self:
-        """Return the engine with a table of the method `name` at a key of the file; lists have plural keys."""
+    def _with(self, key: str, name: str, table: Mapping[str, Any]) -> Self: ...

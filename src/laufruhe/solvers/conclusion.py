@@ -13,6 +13,7 @@ from typing import TypeVar
 from laufruhe.errors import BoundError, ModelError
 from laufruhe.fidelity.error_bounds import measure_sampling_error, relative
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.progress import report_design
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Decision, Kind
 from laufruhe.problem.dependence import depends, open_kinds
@@ -115,7 +116,10 @@ def evaluate_design(problem: Problem, values: Sequence[Value], samples: int | No
     ModelError
         If the design has no finite loads, for example at an undamped resonance.
     """
-    return Design.of(problem, values, evaluate(problem.fixed_at(values), samples=samples))
+    design = Design.of(problem, values, evaluate(problem.fixed_at(values), samples=samples))
+    if design.violation <= FEASIBILITY_TOL:
+        report_design(design.value, (decision.name for decision in problem.decisions), values)
+    return design
 
 
 def initial_design(problem: Problem, initial: Evaluation) -> Design | None:

@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from laufruhe.errors import LaufruheWarning, ModelError
+from laufruhe.errors import LaufruheWarning, ModelError, wrong_call
 from laufruhe.fidelity.error_bounds import regret_bound
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation
@@ -30,9 +30,11 @@ from laufruhe.solvers.values import (
     RankValue,
     relevant_decisions,
 )
+from laufruhe.units import quantity
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pint
     import xarray as xr
 
 INITIAL, FINAL = "initial", "final"
@@ -84,6 +86,24 @@ class ResultContent:
     def name(self) -> str:
         """Name of the problem; for a file, its name without the extension."""
         raise NotImplementedError
+
+    def __getitem__(self, name: str) -> float:
+        """Return a decided number, the objective or a limited quantity by its name [SI]."""
+        return self._named(name).value
+
+    def quantity(self, name: str, unit: Any = "") -> pint.Quantity[float]:
+        """Return a number by its name with its unit [pint], in `unit` if given."""
+        entry = self._named(name)
+        return quantity(entry.value, entry.unit, unit)
+
+    def _named(self, name: str) -> DecisionValue | LimitValue | ObjectiveValue:
+        objective = () if self.objective is None else (self.objective,)
+        numbers: tuple[DecisionValue | LimitValue | ObjectiveValue, ...] = (*self.limits, *objective, *self.decisions)
+        entries = {entry.name: entry for entry in numbers}
+        if name not in entries:
+            remedy = f"it has {', '.join(entries)}" if entries else "it has no numbers"
+            raise wrong_call("name", name, "is no number of this result", remedy)
+        return entries[name]
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the decisions as a table [SI], one row per decision [pandas]."""
@@ -218,6 +238,11 @@ class Result(ResultContent):
             If the mounts are rigid.
         """
         return modes_of(self.designs).dataset()
+
+    @property
+    def unbalances(self) -> dict[str, complex]:
+        """Unbalances of the final design at crank angle 0, by the names of weights [kg m] (C4)."""
+        return {rotor.name: complex(rotor.unbalance) for rotor in self.final.engine.rotors}
 
     @property
     def _with_loads(self) -> dict[str, Evaluation]:
