@@ -41,11 +41,13 @@ def test_a_callback_sees_the_search_and_ends_it(caplog: pytest.LogCaptureFixture
 
     def stop(progress: laufruhe.Progress) -> bool:
         seen.append(progress)
-        return len(seen) == 40
+        return bool(progress.design)
 
     with caplog.at_level(logging.INFO, "laufruhe"):
-        found = laufruhe.solve("tractor-four-shaft-heights", callback=stop)
+        found = laufruhe.solve("powertrain-least-force", callback=stop)
     assert found.status.has_design
+    assert found.certificate is not None
+    assert found.certificate.method.endswith("stopped at the time limit")
     assert [progress.time for progress in seen] == sorted(progress.time for progress in seen)
     assert seen[-1].design
     assert found.history
