@@ -969,7 +969,14 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
     return {**table, "constraints": limits} if limits else table
 
 
+def family_of(name: str) -> Callable[[Generator], Table]:
+    """What makes the problems of a family."""
+    from attack.single_families import FAMILIES as SINGLE
+
+    return {**FAMILIES, **SINGLE}[name]
+
+
 def problem(family: str, seed: int) -> tuple[Table, Generator]:
     """A problem, and the generator that goes on from there."""
     rng = np.random.default_rng([*family.encode(), seed])
-    return with_limits(rng, {"title": f"{family} {seed}", **FAMILIES[family](rng)}), rng
+    return with_limits(rng, {"title": f"{family} {seed}", **family_of(family)(rng)}), rng

@@ -236,6 +236,9 @@ class Openings:
             return {}
         throws, bank, split = self._angles(engine)
         told: Table = {"throws": [math.degrees(t) for t in throws]}
+        if "single_cylinders" in e or "row_angle" in e:
+            fires = [p.firing_angle for p in engine.slider_cranks]
+            told["firing_order"] = sorted(range(1, len(fires) + 1), key=lambda n: fires[n - 1])
         if e["layout"] == "vee":
             told |= {"bank_angle": math.degrees(bank), "split_pin_angle": math.degrees(split)}
         return told

@@ -379,11 +379,81 @@ def _radians(values: list[Any]) -> list[float]:
     return [math.radians(float(v)) for v in values]
 
 
+def own_tables(e: dict[str, Any]) -> dict[int, dict[str, Any]]:
+    """What the file says of single cylinders, by their index."""
+    rows = e.get("single_cylinders", [])
+    return {
+        n - 1: row
+        for row in rows
+        for n in (row["cylinders"] if isinstance(row["cylinders"], list) else [row["cylinders"]])
+    }
+
+
+def spots(e: dict[str, Any], count: int, banks: int) -> list[tuple[int, int]]:
+    """Bank (0 left, 1 right, as it stands) and place from the front of every cylinder by its number."""
+    per, scheme = count // banks, e.get("numbering", "one bank after the other")
+    if isinstance(scheme, list):
+        return [divmod(scheme.index(n), per) for n in range(1, count + 1)]
+    sides = [0, 1][:banks] if e.get("first_bank", "left") == "left" else [1, 0]
+    along = list(range(per)) if e.get("first_end", "front") == "front" else list(range(per))[::-1]
+    if scheme == "alternating":
+        return [(side, k) for k in along for side in sides]
+    return [(side, k) for side in sides for k in along]
+
+
+def distances(e: dict[str, Any], count: int) -> list[float]:
+    """Places along the crank from the front, at one distance or at a list of them."""
+    told = e.get("cylinder_spacing", 1.0)
+    if not isinstance(told, list):
+        return stations(count, number(told))
+    gone = np.concatenate([[0.0], np.cumsum([number(v) for v in told])])
+    return [float(0.5 * gone[-1] - x) for x in gone]
+
+
+def _in_banks(e: dict[str, Any], banks: int, per_throw: int, angle: float, split: float = 0.0) -> list[Mechanism]:
+    """Pistons of one bank or two by their numbers, and then what else turns with the throws."""
+    throws, own, common = _radians(e["throws"]), own_tables(e), _common(e)
+    count, row = len(throws) * per_throw, math.radians(e.get("row_angle", 0.0))
+    at, per = spots(e, count, banks), count // banks
+    xs, stagger = distances(e, per), number(e.get("bank_stagger", 0.0))
+    # y points to the right of an engine that turns the other way
+    left = -0.5 if e.get("rotation") == "counter-clockwise" else 0.5
+    pins: list[tuple[int, ...]] = []
+    for bank, place in at:
+        pin = (place,) if per_throw == 2 else (bank, place)
+        if pin not in pins:
+            pins.append(pin)
+    pin_mass, found = number(e.get("rotating_mass", 0.0)) + e.get("at_throw", 0.0), []
+    turning = [[0.0, 0.0] for _ in pins]
+    for k, (bank, place) in enumerate(at):
+        told = own.get(k, {})
+        numbers = _common(e, told)
+        if "offset" in told and "stroke" not in told:
+            numbers["radius"] = common["radius"]
+        side = 0.0 if banks == 1 else left * (1 - 2 * bank)
+        lean = 0.5 * row * (-1.0) ** place
+        if row:
+            numbers["offset"] *= math.copysign(1.0, lean)
+        pin = pins.index((place,) if per_throw == 2 else (bank, place))
+        x = xs[place] + (0.5 - bank) * stagger * (banks > 1)
+        turning[pin][0] += number(told["rotating_mass"]) if "rotating_mass" in told else pin_mass / per_throw
+        turning[pin][1] = xs[place] if per_throw == 2 else x
+        pin_of = turning[pin][0] if per_throw == 1 else 0.0
+        found.append(Mechanism(x, throws[pin] - side * split, side * angle + lean, pin_mass=pin_of, **numbers))
+    if per_throw == 1:
+        return found
+    still = {**common, "piston_mass": 0.0, "deficit": 0.0, "bore": 0.0, "offset": 0.0, "shank": 0.0}
+    return found + [Mechanism(x, t, 0.0, pin_mass=m, **still) for (m, x), t in zip(turning, throws, strict=True)]
+
+
+def dead_centres(mechanisms: list[Mechanism]) -> list[float]:
+    """Angle of every crank at the top of its piston where these differ, else none."""
+    tops = [math.asin(m.offset / (m.rod + m.radius)) if m.rod else 0.0 for m in mechanisms]
+    return tops if max(tops) - min(tops) > 1e-12 else [0.0] * len(tops)
+
+
 def _inline(e: dict[str, Any]) -> list[Mechanism]:
-    throws, common = _radians(e["throws"]), _common(e)
-    places = stations(len(throws), number(e.get("cylinder_spacing", 1.0)))
-    pin = number(e.get("rotating_mass", 0.0)) + e.get("at_throw", 0.0)
-    return [Mechanism(x, t, 0.0, pin_mass=pin, **common) for x, t in zip(places, throws, strict=True)]
+    return _in_banks(e, 1, 1, 0.0)
 
 
 def _rotary(e: dict[str, Any]) -> list[Mechanism]:
@@ -399,33 +469,12 @@ def _rotary(e: dict[str, Any]) -> list[Mechanism]:
     ]  # fmt: skip
 
 
-def _banks(e: dict[str, Any], angle: float, throws: list[float], split: float) -> list[Mechanism]:
-    """Two banks, whose throws are listed left bank first."""
-    common, stagger = _common(e), number(e.get("bank_stagger", 0.0))
-    count = len(throws) // 2
-    places = stations(count, number(e.get("cylinder_spacing", 1.0)))
-    return [
-        Mechanism(places[k % count] + side * stagger, t - side * split, side * angle, **common)
-        for k, t in enumerate(throws)
-        for side in (0.5 if k < count else -0.5,)
-    ]
-
-
 def _vee(e: dict[str, Any]) -> list[Mechanism]:
-    throws = _radians(e["throws"])
-    bank, split = math.radians(e["bank_angle"]), math.radians(e.get("split_pin_angle", 0.0))
-    pistons = _banks(e, bank, throws + throws, split)
-    places = stations(len(throws), number(e.get("cylinder_spacing", 1.0)))
-    pin = number(e.get("rotating_mass", 0.0))
-    # one mass a throw, between its cylinders
-    common = {**_common(e), "piston_mass": 0.0, "deficit": 0.0, "bore": 0.0, "offset": 0.0}
-    return pistons + [Mechanism(x, t, 0.0, pin_mass=pin, **common) for x, t in zip(places, throws, strict=True)]
+    return _in_banks(e, 2, 2, math.radians(e["bank_angle"]), math.radians(e.get("split_pin_angle", 0.0)))
 
 
 def _boxer(e: dict[str, Any]) -> list[Mechanism]:
-    pin = number(e.get("rotating_mass", 0.0))
-    found = _banks(e, math.pi, _radians(e["throws"]), 0.0)
-    return [_with(m, pin_mass=pin) for m in found]
+    return _in_banks(e, 2, 1, math.pi)
 
 
 def _with(m: Mechanism, **changed: Any) -> Mechanism:
@@ -433,12 +482,17 @@ def _with(m: Mechanism, **changed: Any) -> Mechanism:
 
 
 def _opposed(e: dict[str, Any]) -> list[Mechanism]:
+    count, own = len(e["throws"]), own_tables(e)
     lower = _inline(e)
     ratio, lead = int(e.get("crank_ratio", -1)), math.radians(e.get("crank_lead", 0.0))
     centre = complex(number(e["crank_distance"]))
     upper = [
         _with(m, centre=centre, ratio=ratio, bank=math.pi, throw=math.pi + ratio * (m.throw + lead)) for m in lower
     ]
+    for k in range(count):
+        told = {**e, **own.get(k, {})}
+        if "second_reciprocating_mass" in told:
+            upper[k] = _with(upper[k], piston_mass=number(told["second_reciprocating_mass"]))
     if "bore" in e:
         fires = [(m.bank - m.throw) % (2.0 * math.pi) for m in lower]
         lower = [_with(m, partner=(m.radius, m.rod, lead), fires=at) for m, at in zip(lower, fires, strict=True)]
@@ -469,13 +523,19 @@ def _radial(e: dict[str, Any]) -> list[Mechanism]:
     arm, at_knuckle = number(e["knuckle_radius"]), number(e.get("knuckle_mass", 0.0))
     turned = _radians(e.get("knuckle_angles", [360.0 * k / n for k in range(1, n)]))
     highest = math.sqrt((radius + rod) ** 2 - offset**2)
-    found = [Mechanism(0.0, 0.0, 0.0, pin_mass=number(e.get("rotating_mass", 0.0)), **common)]
+    own = own_tables(e)
+    master = {**common, "piston_mass": number(own.get(0, {}).get("reciprocating_mass", common["piston_mass"]))}
+    found = [Mechanism(0.0, 0.0, 0.0, pin_mass=number(e.get("rotating_mass", 0.0)), **master)]
     for k in range(1, n):
         bank, knuckle = 2.0 * math.pi * k / n, Knuckle(rod, 0.0, offset, arm, turned[k - 1])
+        weighing = (("reciprocating_mass", common["piston_mass"]), ("knuckle_mass", at_knuckle))
+        mass, pin = (number(own.get(k, {}).get(key, default)) for key, default in weighing)
 
-        def made(length: float, bank: float = bank, knuckle: Knuckle = knuckle) -> Mechanism:
-            told = {**common, "rod": length}
-            return Mechanism(0.0, 0.0, bank, pin_mass=at_knuckle, knuckle=knuckle, **told)
+        def made(
+            length: float, bank: float = bank, knuckle: Knuckle = knuckle, mass: float = mass, pin: float = pin
+        ) -> Mechanism:
+            told = {**common, "rod": length, "piston_mass": mass}
+            return Mechanism(0.0, 0.0, bank, pin_mass=pin, knuckle=knuckle, **told)
 
         def above(length: float) -> float:
             m = made(length)
@@ -493,22 +553,24 @@ def _radial(e: dict[str, Any]) -> list[Mechanism]:
     return found
 
 
-def firing_angles(mechanisms: list[Mechanism], order: list[int], turns: int) -> list[float]:
-    """Crank angle of each cylinder's firing: its first dead centre after the one before."""
-    first = mechanisms[order[0] - 1]
-    at = [0.0] * len(order)
-    now = at[order[0] - 1] = (first.bank - first.throw) % (2.0 * math.pi)
+def firing_angles(mechanisms: list[Mechanism], order: list[int], turns: int) -> dict[int, float]:
+    """Crank angle at which each cylinder of an order fires: its first dead centre after the one before."""
+    tops = dead_centres([m for m in mechanisms if m.piston_mass or m.bore])
+    centres = {n: (mechanisms[n - 1].bank - mechanisms[n - 1].throw + tops[n - 1]) % (2.0 * math.pi) for n in order}
+    now = centres[order[0]]
+    at = {order[0] - 1: now}
     for cylinder in order[1:]:
-        m = mechanisms[cylinder - 1]
-        ahead = (m.bank - m.throw - now) % (2.0 * math.pi)
+        ahead = (centres[cylinder] - now) % (2.0 * math.pi)
         now += ahead if ahead > 1e-9 else 2.0 * math.pi
         at[cylinder - 1] = now
     return at
 
 
 def _fired(mechanisms: list[Mechanism], order: list[int], turns: int) -> list[Mechanism]:
+    """Cylinders with the crank angle of their throw's dead centre before which, or at which, they fire."""
     at = firing_angles(mechanisms, order, turns)
-    return [_with(m, fires=at[k]) if k < len(at) else m for k, m in enumerate(mechanisms)]
+    tops = dead_centres([m for m in mechanisms if m.piston_mass or m.bore])
+    return [_with(m, fires=at[k] - tops[k]) if k in at else m for k, m in enumerate(mechanisms)]
 
 
 @lru_cache(maxsize=512)
@@ -536,15 +598,24 @@ def _gas_spectrum(gas: str, m: Mechanism, turns: int) -> np.ndarray:
 
 def gas_spectrum(gas: dict[str, Any], found: Machine) -> np.ndarray:
     """Roll moment of all cylinders, each at its firing angle."""
-    told, orders = json.dumps(gas, sort_keys=True), np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
+    orders = np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
     total = np.zeros((SAMPLES // 2 + 1, 6), complex)
-    if gas["model"] == "chambers":
+    if gas.get("chambers"):
         for k, m in enumerate(found.mechanisms):
-            total[:, 3] += chambers_torque(gas, k, m) * np.exp(1j * orders[:, 0] * (m.throw - m.bank))
+            if any(k + 1 in row.get("cylinders", [k + 1]) for row in gas["chambers"]) and m.piston_mass:
+                once = chambers_torque(gas, k, m)[: SAMPLES // 2 // found.turns + 1]
+                phases = np.exp(1j * orders[:: found.turns, 0][: len(once)] * (m.throw - m.bank))
+                total[:: found.turns, 3][: len(once)] += once * phases
+    if gas["model"] == "chambers":
         return total
-    for m in found.mechanisms:
+    own = own_tables(gas)
+    shared = {key: value for key, value in gas.items() if key not in ("single_cylinders", "chambers")}
+    for k, m in enumerate(found.mechanisms):
         if m.fires is not None:
             upright = _with(m, throw=0.0, bank=0.0, x=0.0, pin_mass=0.0, piston_mass=0.0, shank=0.0, fires=None)
+            told = json.dumps(
+                {**shared, **{key: v for key, v in own.get(k, {}).items() if key != "cylinders"}}, sort_keys=True
+            )
             one = _gas_spectrum(told, upright, found.turns)
             total += one * np.exp(-1j * orders * m.fires)
     return total

@@ -29,6 +29,7 @@ from attack.own_families import OWN_FAMILIES
 from attack.page import lines_of, page
 from attack.plain_loads import SAMPLES
 from attack.plain_scene import Table
+from attack.single_families import FAMILIES as SINGLE_FAMILIES
 from attack.variations import VARIATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,11 +41,12 @@ VARIED = {
 }
 NAMES = [
     *FAMILIES,
+    *SINGLE_FAMILIES,
     *OWN_FAMILIES,
     *CROSSINGS,
     *(f"{variation} of {family}" for variation, families in VARIED.items() for family in families),
 ]
-GROUPS = {"all": NAMES, "crossings": [*CROSSINGS], "alone": [*FAMILIES, *OWN_FAMILIES]}
+GROUPS = {"all": NAMES, "crossings": [*CROSSINGS], "alone": [*FAMILIES, *SINGLE_FAMILIES, *OWN_FAMILIES]}
 """Families by one word."""
 FINER = 32768
 EFFORT = 6

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from attack.openings import is_open
-from attack.plain_loads import turns_of
+from attack.plain_loads import dead_centres, machine, turns_of
 from attack.plain_scene import Table
 
 
@@ -30,6 +30,9 @@ def angles_of(engine: Table) -> Iterator[tuple[float, float]]:
 def even_stars(engine: Table) -> Iterator[Table]:
     """What to put into [engine], for every star that fires evenly, its first throw where cylinder 1 fires at 0."""
     turns, count = turns_of(engine), int(engine["cylinders"])
+    if engine["layout"] == "inline" and {"single_cylinders", "row_angle"} & engine.keys():
+        yield from fired_stars(engine, turns, count)
+        return
     steps = count // math.gcd(turns, count)
     if engine["layout"] != "vee":
         for places in _stands(steps, count, [0], count // steps):
@@ -43,6 +46,22 @@ def even_stars(engine: Table) -> Iterator[Table]:
         for places in _stands(steps, count // 2, [0, round(apart) % steps], count // steps):
             told = [first + 360.0 * k / steps for k in places]
             yield {"throws": told, "bank_angle": bank, "split_pin_angle": split}
+
+
+def fired_stars(engine: Table, turns: int, count: int) -> Iterator[Table]:
+    """The same of cylinders in line that differ: by the order in which they fire, which turns every throw."""
+    upright = machine({**engine, "throws": [0.0] * count, "firing_order": None}).mechanisms
+    centres = [math.degrees(m.bank + top) for m, top in zip(upright, dead_centres(list(upright)), strict=True)]
+    fires = [360.0 * turns * slot / count for slot in range(count)]
+    seen = set()
+    for rest in itertools.permutations(range(2, count + 1)):
+        order = [1, *rest]
+        at = tuple(fires[order.index(n)] % 360.0 for n in range(1, count + 1))
+        # order counts for gas alone
+        if "bore" in engine or at not in seen:
+            seen.add(at)
+            throws = [(c - a) % 360.0 for c, a in zip(centres, at, strict=True)]
+            yield {"throws": throws, "firing_order": order}
 
 
 def _stands(steps: int, throws: int, own: list[int], each: int) -> Iterator[tuple[int, ...]]:

@@ -26,6 +26,8 @@ SEEDS = {
     "yokes": (3, 4), "chambers": (2, 5), "rotary": (4, 8),
     "uneven": (0, 2), "places": (0,), "leads": (22, 25), "bank angle": (2, 3), "sizes": (100009, 100013),
     "uneven crankcase": (1101, 101001), "worst means": (0, 2), "root mean quads": (9, 11),
+    "single cylinders": (101, 103), "single gas": (102, 122), "single stars": (101, 104),
+    "single opposed pistons": (101,), "single radial cylinders": (101,),
     "prices of elastic-balance": (1,), "prices of convex-mounts": (1,),
     "monotony of inline": (2,), "invariance of convex-mounts": (1,), "invariance of inline": (2,),
 }  # fmt: skip
@@ -37,6 +39,7 @@ MORE = {
     ("elastic-balance", 1), ("elastic-balance", 2),
     ("uneven", 2), ("leads", 25), ("bank angle", 3), ("gas", 0), ("crankcase", 0), ("boxer", 0), ("rotary", 8),
     ("open-vees", 1), ("sizes", 100013), ("uneven crankcase", 1101), ("vee", 3), ("radial", 5), ("parts", 5),
+    ("single cylinders", 103), ("single gas", 102), ("single stars", 104),
     ("yokes", 4), ("chambers", 5), ("worst means", 2), ("root mean quads", 11), ("convex-mounts", 1),
 }  # fmt: skip
 """Costly ones, of families that keep another."""

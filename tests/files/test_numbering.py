@@ -405,9 +405,9 @@ class TestRows:
             )
         assert np.degrees(engine.firing_intervals) == pytest.approx([120.0] * 6)
 
-    def test_open_throws_are_refused(self) -> None:
-        engine = {"layout": "inline", "row_angle": 15, "cylinders": 6, "throws": "open"}
-        assert "engine.row_angle: cannot stand beside open throws" in refusal(engine)
+    def test_uneven_open_throws_are_refused(self) -> None:
+        engine = {"layout": "inline", "row_angle": 15, "cylinders": 6, "throws": [0, *[{"between": [0, 360]}] * 5]}
+        assert "engine.row_angle: puts the dead centres of throws at different angles" in refusal(engine)
 
 
 def test_a_free_list_may_have_a_firing_order_and_a_mass_for_each_piston() -> None:

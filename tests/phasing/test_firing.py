@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -20,7 +21,7 @@ from laufruhe.machine.firing import (
     star_throws,
     successive_neighbours,
 )
-from laufruhe.machine.layouts import Mechanism, boxer, build, inline, vee
+from laufruhe.machine.layouts import Mechanism, build, inline, vee
 
 FOUR, TWO = Cycle.FOUR_STROKE, Cycle.TWO_STROKE
 MECHANISM = Mechanism(0.05, 0.2, 1.0)
@@ -66,7 +67,7 @@ def test_a_vee_that_cannot_fire_evenly_says_why():
     with pytest.raises(NoEvenStarError, match=r"multiple of 120 deg, and they make 90 deg"):
         even_patterns(FOUR, vee(6, 1.0, RIGHT))
     with pytest.raises(NoEvenStarError, match="the same arrangement of cylinders"):
-        even_patterns(FOUR, boxer(4, 1.0, 0.1))
+        even_patterns(FOUR, replace(vee(4, 1.0, 0.0), banks=(0.0, 0.0, 0.0, math.pi)))
 
 
 @pytest.mark.parametrize(

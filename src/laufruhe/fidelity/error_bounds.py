@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from laufruhe.machine import Cycle, Engine, GasModel, PressureTrace
+from laufruhe.machine import Cycle, Engine, PressureTrace
+from laufruhe.machine.chambers import CommonGas, CylinderGases, models_of
 from laufruhe.numerics.kinks import SAME_ANGLE
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
@@ -282,12 +283,15 @@ def gas_step_bound(problem: Problem, evaluation: Evaluation) -> float:
 def trace_error(problem: Problem, evaluation: Evaluation) -> float:
     """Return the error of the objective from the points of measured traces, the same for all designs (F9a)."""
     fidelity = without_time(evaluation.fidelity)
-    if not any(isinstance(fidelity.gas_of(loads.point), PressureTrace) for loads in evaluation.loads):
+    models = (model for loads in evaluation.loads for model in models_of(fidelity.gas_of(loads.point)))
+    if not any(isinstance(model, PressureTrace) for model in models):
         return 0.0
     initial = evaluation if fidelity is evaluation.fidelity else evaluate(problem.at(fidelity), evaluation.engine)
     changes, cycle = [], evaluation.engine.cycle
     for change in (lambda gas: _straight(gas, cycle), _thinned):
-        points = tuple(replace(point, gas=change(fidelity.gas_of(point))) for point in problem.points)
+        gases = map(fidelity.gas_of, problem.points)
+        changed_gases = [g.mapped(change) if isinstance(g, CylinderGases) else g and change(g) for g in gases]
+        points = tuple(replace(p, gas=gas) for p, gas in zip(problem.points, changed_gases, strict=True))
         changed = evaluate(replace(problem, points=points, fidelity=fidelity), evaluation.engine)
         terms = ErrorReference(problem, evaluation).terms
         changes.append(sum(term.weight * _norm_of_difference(term.measure, initial, changed) for term in terms))
@@ -303,7 +307,7 @@ def _norm_of_difference(measure: Measure, ours: Evaluation, theirs: Evaluation) 
     return load_rows(measure, points, signals, engine, STRAIGHT * ours.fidelity.gas_steps).value
 
 
-def _straight(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
+def _straight(gas: CommonGas, cycle: Cycle) -> CommonGas:
     if not isinstance(gas, PressureTrace):
         return gas
     angles, pressures = list(gas.angles), list(gas.pressures)
@@ -314,7 +318,7 @@ def _straight(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
     return replace(gas, angles=resampled[0], pressures=resampled[1])
 
 
-def _thinned(gas: GasModel | None) -> GasModel | None:
+def _thinned(gas: CommonGas) -> CommonGas:
     if not isinstance(gas, PressureTrace) or len(gas.angles) < FEWEST:
         return gas
     keeps = [*range(0, len(gas.angles) - 1, 2), len(gas.angles) - 1]

@@ -44,6 +44,8 @@ _OF_PISTONS = (
 # keys that a slider-crank of a free list takes from [engine] by default
 _INHERITED = {"stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_deficit"}
 _OPPOSED = "second crankshaft"
+_OF_ORDER = ("throws", "firing_order", "firing_intervals")
+_SAME_RADIUS = 1e-9
 _SECOND, _RECIPROCATING = "second_reciprocating_mass", "reciprocating_mass"
 
 
@@ -99,6 +101,7 @@ class SliderCrankTable(Table):
 _KINDS: dict[str, Any] = {
     "length": f.Length,
     "positive length": f.PositiveLength,
+    "positive lengths": Annotated[list[f.PositiveLength], f.ListOrSingle(f.PositiveLength)],
     "non-negative length": f.NonNegativeLength,
     "angle": f.Angle,
     "open angle": f.OpenAngle,
@@ -128,6 +131,40 @@ def _with_owned_keys(table: type[f.TableModel]) -> type[f.TableModel]:
         kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
         fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
     return f.with_keys(table, fields)
+
+
+def _with_single_keys(table: type[f.TableModel]) -> type[f.TableModel]:
+    # single cylinders take keys of layouts too, whose masses are not open here
+    keys = {key.name: key for kind in LAYOUTS.values() for key in kind.keys if key.name in kind.single}
+    kinds = _KINDS | {"open mass": f.Mass}
+    fields = {key.name: (kinds[key.kind] | None, Field(None, description=key.description)) for key in keys.values()}
+    return f.with_keys(table, fields)
+
+
+@_with_single_keys
+class SingleCylinderTable(Table):
+    """Cylinders that differ from the others; missing keys are those of [engine]."""
+
+    cylinders: Annotated[list[CylinderNumber], f.ListOrSingle(CylinderNumber), Field(min_length=1)] = f.required(
+        "Their numbers; with two pistons in a cylinder the keys count for both."
+    )
+    bore: f.NonNegativeLength | None = f.optional("Diameter of the cylinder; 0 for a piston on which no gas acts.")
+    stroke: f.PositiveLength | None = None
+    rod_ratio: f.NonNegative | None = None
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length | None = f.optional("Offset at the crank radius of [engine], or at that of a stroke beside it.")
+    reciprocating_mass: f.OpenMass | None = f.optional("Reciprocating mass as weighed; rotating_mass has the rest.")
+    rotating_mass: f.Mass | None = f.optional(
+        "Rotating mass that belongs to this cylinder, by default an equal share of that of its throw."
+    )
+    rod: RodTable | None = None
+    rod_inertia_deficit: f.Inertia | None = None
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """Keys of [engine] with values of these cylinders alone."""
+        values = {key: getattr(self, key) for key in type(self).model_fields if key != "cylinders"}
+        return {key: value for key, value in values.items() if value is not None}
 
 
 @_with_owned_keys
@@ -163,6 +200,7 @@ class EngineTable(Table):
     fires_together: bool = f.optional("Whether cylinders are meant to fire at once; else you are asked.", False)
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
+    single_cylinders: list[SingleCylinderTable] = Field(default_factory=list)
 
     @property
     def piston_mass(self) -> float:
@@ -174,6 +212,11 @@ class EngineTable(Table):
         """Open masses by their keys, which are also the names of attributes of mechanisms."""
         keys = ["reciprocating_mass", *(k.name for k in DRIVES[self.drive].keys if k.kind == "open mass")]
         return {key: mass for key in keys if isinstance(mass := getattr(self, key), Open) and mass.is_open}
+
+    @property
+    def single(self) -> dict[int, SingleCylinderTable]:
+        """Table of each cylinder that differs from [engine], by its index."""
+        return {number - 1: row for row in self.single_cylinders for number in row.cylinders}
 
     @property
     def listed_throws(self) -> list[float] | None:
@@ -227,6 +270,11 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     throws = _throws(table, layout)
     with errors_at_key("engine.firing_order" if table.listed_order else "engine"):
         parts, cranks = kind.parts(inputs, layout, throws)
+    for crank in cranks:
+        for k in crank.cylinders[1:]:
+            if abs(parts[k].crank_radius / parts[crank.cylinders[0]].crank_radius - 1.0) > _SAME_RADIUS:
+                rule = f"gives {parts[crank.cylinders[0]].name} and {parts[k].name} two crank radii on one throw"
+                raise Refused("engine.single_cylinders", None, rule, "give both the same stroke and offset")
     return _sharing_chambers(table, parts, gas), cranks
 
 
@@ -255,8 +303,7 @@ def layout_of(table: EngineTable) -> Layout:
     _check_pistons(table)
     with errors_at_key("engine.cylinders"):
         inputs = _layout_input(table)
-        layout = table.kind.place(inputs)
-        return layout if list(inputs.places) == sorted(inputs.places) else layout.renumbered(inputs.places)
+        return table.kind.layout(inputs)
 
 
 def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
@@ -277,7 +324,7 @@ def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
         if other_count != count:
             rule = f"gives {counted(other_count, 'cylinder')}, but engine.{first} gives {count}"
             raise Refused(f"engine.{key}", None, rule, "make both give the same number of cylinders")
-    check_order(table.listed_order, count)
+    check_order(table.listed_order, count, idle_cylinders(table))
     mechanism, rod = _mechanism(table, numbers)
     stagger = numbers.get("bank_stagger")
     if stagger and table.value_of("rotation") == REVERSED:
@@ -285,7 +332,45 @@ def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
         numbers["bank_stagger"] = -stagger
     cycle, places = cycle_of(table), place_order(table, table.kind, count)
     intervals = _intervals(table, cycle)
-    return LayoutInput(cycle, count, mechanism, numbers | rods, places, order, intervals, table.piston_mass, rod, gas)
+    single = _single_inputs(table, count, gas)
+    return LayoutInput(
+        cycle, count, mechanism, numbers | rods, places, order, intervals, table.piston_mass, rod, gas, single
+    )
+
+
+def idle_cylinders(table: EngineTable) -> tuple[int, ...]:
+    """Return the numbers of cylinders without a bore, which never fire."""
+    return tuple(k + 1 for k, row in table.single.items() if row.bore == 0.0)
+
+
+def _single_inputs(table: EngineTable, count: int, gas: bool) -> dict[int, LayoutInput]:
+    inputs: dict[int, LayoutInput] = {}
+    for j, row in enumerate(table.single_cylinders, 1):
+        where, keys = f"engine.single_cylinders[{j}]", row.numbers
+        for key in keys:
+            if key not in table.kind.single:
+                rule, remedy = f"cannot be that of a single cylinder in layout '{table.layout}'", "leave it out"
+                raise Refused(f"{where}.{key}", None, rule, remedy)
+        for number in row.cylinders:
+            if number > count or number - 1 in inputs:
+                rule = f"is not among {counted(count, 'cylinder')}" if number > count else "is given twice"
+                raise Refused(f"{where}.cylinders", number, rule, "name each cylinder at most once, counted from 1")
+            if {"rod_ratio", "rod_length"} & keys.keys():
+                keys = {"rod_ratio": None, "rod_length": None} | keys
+            update = {key: keys[key] for key in keys.keys() - {"rotating_mass"}}
+            if "offset" in keys and "stroke" not in keys:
+                # crank and rod stay, and the stroke follows from the offset
+                update |= {"stroke": 2.0 * _radius_and_rod(table)[0], "offset": 0.0}
+            one = table.model_copy(
+                update=update | dict.fromkeys(_OF_ORDER) | {"cylinders": count, "single_cylinders": []}
+            )
+            with errors_at_key(where):
+                values = _layout_input(one, gas)
+                offset = keys.get("offset", values.mechanism.offset)
+                mechanism = replace(values.mechanism, offset=offset, pin_mass=keys.get("rotating_mass"))
+                mechanism.cylinder(number, 0.0, 0.0, 0.0, 0.0)
+            inputs[number - 1] = replace(values, mechanism=mechanism)
+    return inputs
 
 
 def _intervals(table: EngineTable, cycle: Cycle) -> tuple[float, ...]:
@@ -313,15 +398,17 @@ def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
         raise Refused("engine.firing_order", [], "names no cylinder", "name every cylinder once")
     if throws == []:
         raise Refused("engine.throws", [], "names no throw", "give the angle of each throw, as in [0, 180, 180, 0]")
-    counts += [("firing_order", len(order))] if order is not None else []
+    counts += [("firing_order", len(order) + len({*idle_cylinders(table)} - {*order}))] if order is not None else []
     return counts + ([("throws", len(throws) * per_throw)] if isinstance(throws, list) else [])
 
 
-def check_order(order: Sequence[int] | None, count: int) -> None:
-    """Raise `Refused` for a firing order that is not a permutation of the cylinders."""
-    if order is not None and sorted(order) != list(range(1, count + 1)):
-        rule = f"is no permutation of 1 to {count}"
-        raise Refused("engine.firing_order", list(order), rule, "name every cylinder once")
+def check_order(order: Sequence[int] | None, count: int, idle: Sequence[int] = ()) -> None:
+    """Raise `Refused` for a firing order that is not a permutation of the cylinders without the idle ones."""
+    firing = [number for number in range(1, count + 1) if number not in idle]
+    if order is not None and sorted(order) != firing:
+        rule = f"is no permutation of {', '.join(map(str, firing))}" if idle else f"is no permutation of 1 to {count}"
+        remedy = "name every cylinder with a bore once" if idle else "name every cylinder once"
+        raise Refused("engine.firing_order", list(order), rule, remedy)
 
 
 def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
@@ -464,10 +551,14 @@ def piston_masses(
     def decide(name: str, mass: Open, names: Sequence[str], key: str = _RECIPROCATING) -> None:
         decisions.extend(mass.decisions(name, "kg", *(NumberDrive(Kind.PISTON, (part, key)) for part in names)))
 
+    count = 1 if table.kind.is_free else cylinder_counts(table)[0][1]
+    rows: Sequence[Any] = table.slider_cranks or [table.single.get(k % count) for k in range(len(parts))]
     for key, mass in table.open_masses.items():
-        part_masses = [getattr(row, key, None) for row in table.slider_cranks] or [
-            second if part.shaft != CRANKSHAFT and key == _RECIPROCATING else None for part in parts
-        ]
+        part_masses = [getattr(row, key, None) for row in rows]
+        if second is not None and key == _RECIPROCATING:
+            part_masses = [
+                m if part.shaft == CRANKSHAFT else second for m, part in zip(part_masses, parts, strict=True)
+            ]
         names = [part.name for part, mass_of in zip(parts, part_masses, strict=True) if mass_of is None]
         decide(key.replace("_", " "), mass, names, key)
     if isinstance(second, Open):
@@ -475,6 +566,13 @@ def piston_masses(
     for part, row in zip(parts, table.slider_cranks, strict=False):
         if isinstance(row.reciprocating_mass, Open):
             decide(f"reciprocating mass of {part.name}", row.reciprocating_mass, [part.name])
+    for single in table.single_cylinders:
+        if isinstance(single.reciprocating_mass, Open):
+            pistons = [k for k in range(len(parts)) if k % count + 1 in single.cylinders]
+            names = [parts[k].name for k in pistons if second is None or parts[k].shaft == CRANKSHAFT]
+            word = "cylinders" if single.cylinders[1:] else "cylinder"
+            name = f"reciprocating mass of {word} {', '.join(map(str, single.cylinders))}"
+            decide(name, single.reciprocating_mass, names)
     if decisions:
         check_factors(weights, f"counts the {decisions[0].name}, which is open")
     return decisions

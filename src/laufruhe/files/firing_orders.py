@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from laufruhe.errors import Complaint
 from laufruhe.files.complaints import Refused
-from laufruhe.files.engine import EngineTable, cycle_of, layout_of, moving_parts
+from laufruhe.files.engine import EngineTable, cycle_of, idle_cylinders, layout_of, moving_parts
 from laufruhe.files.numbering import ALTERNATING, BY_BANK, KEYS, USUAL, place_order
 from laufruhe.files.toml_text import toml_value
 from laufruhe.machine import Cycle, SliderCrank
@@ -86,7 +86,8 @@ def explained_orders(table: EngineTable) -> Iterator[None]:
 def order_warnings(table: EngineTable, parts: Sequence[SliderCrank]) -> tuple[Complaint, ...]:
     """Return a warning about a firing order that its crank allows, but that other numbers of the cylinders explain."""
     order = table.listed_order
-    if order is None or len(order) < 3 or table.firing_intervals or not table.kind.takes("numbering"):
+    is_usual = order is not None and len(order) >= 3 and table.kind.takes("numbering") and not idle_cylinders(table)
+    if order is None or not is_usual or table.firing_intervals:
         return ()
     fit = _Fit(table, parts[: len(order)])
     if fit.pairs and table.kind.banks > 1:

@@ -2,73 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
+import numpy as np
 from pydantic import Field
 
 from laufruhe.errors import counted
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, si_value
 from laufruhe.files.fields import Table
-from laufruhe.files.recorded_trace import RecordedTable, recorded_trace
+from laufruhe.files.recorded_trace import NEAR_FIRING, Column, RecordedTable, recorded_trace
 from laufruhe.machine import (
     Chamber,
     Chambers,
     Cycle,
     GasModel,
+    PressureTrace,
     Pump,
     Seiliger,
     SliderCrank,
     Steam,
     Wiebe,
 )
+from laufruhe.machine.chambers import CommonGas, CylinderGases
 from laufruhe.machine.gas import AMBIENT_PRESSURE
 from laufruhe.physics.gas_cycle import chamber_cycle_of, check_chamber
-
-
-class ChargeTable(Table):
-    """Charge and gas exchange of a computed cycle."""
-
-    compression_ratio: f.Positive | None = None
-    intake_pressure: f.PositivePressure | None = None
-    exhaust_pressure: f.PositivePressure | None = None
-    crankcase_pressure: f.PositivePressure | None = None
-
-
-class SeiligerTable(ChargeTable):
-    """Seiliger cycle (mixed heat supply); its cut-off follows from the indicated mean pressure."""
-
-    makes: ClassVar = Seiliger
-    model: Literal["seiliger"]
-    peak_pressure: f.PositivePressure
-    imep: f.Pressure
-    compression_exponent: f.Positive | None = None
-    expansion_exponent: f.Positive | None = None
-
-
-class WiebeTable(ChargeTable):
-    """Cycle with Wiebe heat release; the heat follows from the indicated mean pressure."""
-
-    makes: ClassVar = Wiebe
-    model: Literal["wiebe"]
-    imep: f.Pressure
-    start: f.Angle
-    duration: f.Angle
-    shape: f.NonNegative | None = None
-    completeness: f.Positive | None = None
-    heat_ratio: f.Positive | None = None
-
-
-class TraceTable(RecordedTable):
-    """A recorded cylinder pressure."""
-
-    model: Literal["trace"]
-    angle_zero: f.Side | None = f.optional(
-        'Crank angle after firing at which the file counts zero, or its dead centre: "firing" or "gas exchange".'
-    )
-    crankcase_pressure: f.PositivePressure | None = None
 
 
 class SteamTable(Table):
@@ -114,6 +75,78 @@ class ChamberTable(Table):
     )
 
 
+class SingleGasTable(Table):
+    """Cylinders whose gas differs; missing keys are those of [gas]."""
+
+    cylinders: Annotated[list[f.CylinderNumber], f.ListOrSingle(f.CylinderNumber), Field(min_length=1)] = f.required(
+        "Their numbers."
+    )
+    imep: f.Pressure | None = f.optional("Indicated mean effective pressure of these cylinders.")
+    peak_pressure: f.PositivePressure | None = f.optional("Peak pressure of these cylinders, with model seiliger.")
+    compression_ratio: f.Positive | None = None
+
+
+class ChargeTable(Table):
+    """Charge and gas exchange of a computed cycle."""
+
+    compression_ratio: f.Positive | None = None
+    intake_pressure: f.PositivePressure | None = None
+    exhaust_pressure: f.PositivePressure | None = None
+    crankcase_pressure: f.PositivePressure | None = None
+
+
+class FiredTable(Table):
+    """Gas of cylinders that fire, beside chambers of pistons that do not."""
+
+    single_cylinders: list[SingleGasTable] = Field(default_factory=list)
+    chambers: Annotated[list[ChamberTable], Field(max_length=100)] = Field(
+        default_factory=list,
+        description="Chambers of pistons that never fire, such as those of a compressor: cylinders with bore 0.",
+    )
+
+
+class SeiligerTable(ChargeTable, FiredTable):
+    """Seiliger cycle (mixed heat supply); its cut-off follows from the indicated mean pressure."""
+
+    makes: ClassVar = Seiliger
+    model: Literal["seiliger"]
+    peak_pressure: f.PositivePressure
+    imep: f.Pressure
+    compression_exponent: f.Positive | None = None
+    expansion_exponent: f.Positive | None = None
+
+
+class WiebeTable(ChargeTable, FiredTable):
+    """Cycle with Wiebe heat release; the heat follows from the indicated mean pressure."""
+
+    makes: ClassVar = Wiebe
+    model: Literal["wiebe"]
+    imep: f.Pressure
+    start: f.Angle
+    duration: f.Angle
+    shape: f.NonNegative | None = None
+    completeness: f.Positive | None = None
+    heat_ratio: f.Positive | None = None
+
+
+class TraceTable(RecordedTable, FiredTable):
+    """A recorded cylinder pressure."""
+
+    model: Literal["trace"]
+    angle_zero: f.Side | None = f.optional(
+        'Crank angle after firing at which the file counts zero, or its dead centre: "firing" or "gas exchange".'
+    )
+    crankcase_pressure: f.PositivePressure | None = None
+    cylinder_columns: Annotated[list[Column], Field(min_length=1, max_length=48)] | None = f.optional(
+        "Names or numbers of the columns with the pressures of cylinders 1, 2, 3, ..., in place of pressure_column."
+    )
+    cylinder_angles: Literal["own", "common"] = f.optional(
+        'Firing from which the angles of cylinder_columns count: each from that of its cylinder ("own"), or all from '
+        'that of cylinder 1 ("common").',
+        "own",
+    )
+
+
 class ChambersTable(Table):
     """Chambers on both sides of the pistons: steam engines, pumps, and both on one rod."""
 
@@ -140,15 +173,97 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
     air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
     with errors_at_key("gas"):
         if isinstance(table, ChambersTable):
-            return Chambers(_chambers(table, folder, cycle, parts, air), air)
+            _require_chambers(cycle)
+            return Chambers(_chambers(table.chambers, folder, parts, air), air)
+        single = _single_chambers(table, folder, parts, air)
+        common: CommonGas
         if isinstance(table, TraceTable):
-            chamber_cycle, pace = chamber_cycle_of(parts[0], cycle) if parts else (cycle, 1.0)
-            return recorded_trace(table, folder, "gas", chamber_cycle, pace, air, _angle_zero(table, chamber_cycle))
-        gas: GasModel = table.makes(**table.model_dump(exclude={"model"}, exclude_none=True))
+            common, traces = _traces(table, folder, cycle, parts, air)
+            single |= traces
+        else:
+            common = table.makes(**_numbers(table))
+            for k, row in enumerate(table.single_cylinders, 1):
+                where = f"gas.single_cylinders[{k}]"
+                numbers = row.model_dump(exclude={"cylinders"}, exclude_none=True)
+                for key in numbers:
+                    if key not in type(table).model_fields:
+                        raise Refused(f"{where}.{key}", None, f"means nothing with model {table.model}", "leave it out")
+                with errors_at_key(where):
+                    model = table.makes(**_numbers(table) | numbers)
+                for name in _names(row.cylinders, parts, f"{where}.cylinders"):
+                    if name in single:
+                        raise Refused(f"{where}.cylinders", name, "is given twice", "name each cylinder at most once")
+                    single[name] = model
+    gas: GasModel = CylinderGases(common, tuple(single.items())) if single else common
     with errors_at_key("gas.compression_ratio"):
         for part in parts:
             check_chamber(gas, part)
     return gas
+
+
+def _numbers(table: SeiligerTable | WiebeTable) -> dict[str, Any]:
+    return table.model_dump(exclude={"model", "single_cylinders", "chambers"}, exclude_none=True)
+
+
+def _names(numbers: Sequence[int], parts: Sequence[SliderCrank], where: str) -> list[str]:
+    # two pistons in one cylinder have the same gas
+    names = []
+    for number in numbers:
+        if number > len(parts):
+            raise Refused(where, number, f"is not among {counted(len(parts), 'cylinder')}", "count them from 1")
+        part = parts[number - 1]
+        names += [part.name, *(other.name for other in parts if part.faces(other) or other.faces(part))]
+    return names
+
+
+def _single_chambers(table: FiredTable, folder: Path, parts: Sequence[SliderCrank], air: float) -> dict[str, CommonGas]:
+    """Return the chambers of pistons that never fire, by their names."""
+    for k, row in enumerate(table.chambers, 1):
+        for number in row.cylinders or [0]:
+            if not number:
+                rule, remedy = "is missing beside gas that fires", "name the cylinders of the chamber, with bore 0"
+                raise Refused(f"gas.chambers[{k}].cylinders", None, rule, remedy)
+            if number <= len(parts) and parts[number - 1].bore != 0.0:
+                rule = "has a bore, on which the gas that fires acts"
+                raise Refused(f"gas.chambers[{k}].cylinders", number, rule, 'give this cylinder bore = "0 mm"')
+    chambers = _chambers(table.chambers, folder, parts, air)
+    names = dict.fromkeys(name for chamber in chambers for name in chamber.cylinders)
+    return {name: Chambers(tuple(c for c in chambers if name in c.cylinders), air) for name in names}
+
+
+def _traces(
+    table: TraceTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank], air: float
+) -> tuple[PressureTrace, dict[str, CommonGas]]:
+    """Return the recorded trace of cylinder 1, and those of the cylinders with columns of their own, by names."""
+    chamber_cycle, pace = chamber_cycle_of(parts[0], cycle) if parts else (cycle, 1.0)
+    zero, columns = _angle_zero(table, chamber_cycle), table.cylinder_columns
+    if table.single_cylinders:
+        rule, remedy = "means nothing with model trace", "name a column of each cylinder by cylinder_columns"
+        raise Refused("gas.single_cylinders", None, rule, remedy)
+    if columns is None:
+        return recorded_trace(table, folder, "gas", chamber_cycle, pace, air, zero), {}
+    if table.pressure_column is not None:
+        raise Refused("gas.pressure_column", None, "is given beside cylinder_columns", "keep one")
+    fired = [k for k, part in enumerate(parts) if part.bore != 0.0 and not any(map(part.faces, parts[:k]))]
+    if len(columns) != len(fired):
+        rule = f"has {counted(len(columns), 'column')} for {counted(len(fired), 'cylinder')} that fire"
+        raise Refused("gas.cylinder_columns", None, rule, "name one column for each cylinder, by its number")
+    traces, period = dict[str, CommonGas](), chamber_cycle.angle / pace
+    first: PressureTrace | None = None
+    for k, column in zip(fired, columns, strict=True):
+        one = table.model_copy(update={"pressure_column": [column]})
+        later = parts[k].firing_angle - parts[fired[0]].firing_angle if table.cylinder_angles == "common" else 0.0
+        trace = recorded_trace(one, folder, "gas", chamber_cycle, pace, air, zero, later)
+        peak = math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)
+        if abs(peak) > NEAR_FIRING:
+            other = "own" if table.cylinder_angles == "common" else "common"
+            rule = f"puts the peak of {parts[k].name} {math.degrees(peak):.4g} deg after its firing"
+            remedy = f'check columns and firing_order, or write cylinder_angles = "{other}"'
+            raise Refused("gas.cylinder_columns", column, rule, remedy)
+        first = first or trace
+        traces |= dict.fromkeys(_names([k + 1], parts, "gas.cylinder_columns"), trace)
+    assert first is not None
+    return first, traces
 
 
 def _angle_zero(table: TraceTable, cycle: Cycle) -> str | float | None:
@@ -163,12 +278,17 @@ def _angle_zero(table: TraceTable, cycle: Cycle) -> str | float | None:
     return si_value(f"{zero} deg" if isinstance(zero, float | int) else zero, "rad", key)
 
 
-def _chambers(
-    table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank], air: float
-) -> tuple[Chamber, ...]:
+def _require_chambers(cycle: Cycle) -> None:
     if cycle is not Cycle.TWO_STROKE:
         rule = "does not suit gas chambers, which work once a turn"
         raise Refused("engine.cycle", str(cycle), rule, 'write "two-stroke"')
+
+
+def _chambers(
+    tables: Sequence[ChamberTable], folder: Path, parts: Sequence[SliderCrank], air: float
+) -> tuple[Chamber, ...]:
+    if not tables:
+        return ()
     if any(not part.has_rod for part in parts):
         raise Refused(
             "gas.model", "chambers", "needs pistons, but a rotary engine has none", "use seiliger, wiebe or trace"
@@ -178,9 +298,7 @@ def _chambers(
         raise Refused(
             "engine.layout", None, rule, "give each piston its own cylinder, or use another gas model such as seiliger"
         )
-    chambers = tuple(
-        _chamber(chamber_table, k, folder, parts, air) for k, chamber_table in enumerate(table.chambers, 1)
-    )
+    chambers = tuple(_chamber(chamber_table, k, folder, parts, air) for k, chamber_table in enumerate(tables, 1))
     require_distinct([chamber.name for chamber in chambers], "gas.chambers", "chambers have one name")
     return chambers
 

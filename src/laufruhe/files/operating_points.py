@@ -15,7 +15,8 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, require_one_of, si_value
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Table
-from laufruhe.machine import Cycle, GasModel, OperatingPoint, Seiliger, Wiebe
+from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, Seiliger, Wiebe
+from laufruhe.machine.chambers import CommonGas, CylinderGases
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
@@ -212,6 +213,25 @@ def _loads(
     return [(", least load", lowest), (", mean load", middle), (", most load", largest)]
 
 
+def _loaded_cylinders(gas: CylinderGases, table: OperatingPointTable, cycle: Cycle, where: str) -> CylinderGases:
+    # the imep of an operating point is that of the common gas; single cylinders keep their ratio to it, and chambers
+    common = gas.common
+    share = (
+        table.imep / common.imep
+        if table.imep is not None and isinstance(common, Seiliger | Wiebe) and common.imep
+        else 1.0
+    )
+
+    def loaded(model: CommonGas) -> CommonGas:
+        if isinstance(model, Chambers):
+            return model
+        imep = model.imep * share if table.imep is not None and isinstance(model, Seiliger | Wiebe) else None
+        one = _loaded(model, table.model_copy(update={"imep": imep or table.imep}), cycle, where)
+        return model if one is None or isinstance(one, CylinderGases) else one
+
+    return gas.mapped(loaded)
+
+
 def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, where: str) -> GasModel | None:
     if table.motored and table.imep is not None:
         rule = "is given for a motored point, which has no combustion"
@@ -220,6 +240,8 @@ def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, wher
         return None
     if not table.motored and table.imep is None:
         return gas
+    if isinstance(gas, CylinderGases):
+        return _loaded_cylinders(gas, table, cycle, where)
     if not isinstance(gas, Seiliger | Wiebe):
         key = "motored" if table.motored else "imep"
         raise Refused(

@@ -14,7 +14,7 @@ from laufruhe import units
 from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
-from laufruhe.files.engine import EngineTable, check_order, cycle_of, cylinder_counts, layout_of
+from laufruhe.files.engine import EngineTable, check_order, cycle_of, cylinder_counts, idle_cylinders, layout_of
 from laufruhe.files.fields import Open, Table
 from laufruhe.files.rotors import BalancerShaftTable
 from laufruhe.machine import Cycle
@@ -87,9 +87,10 @@ def open_phasing(
     if engine.firing_intervals is not None:
         rule, remedy = "cannot stand beside open throws, orders, angles or shafts", "give intervals in [phasing]"
         raise Refused("engine.firing_intervals", None, rule, remedy)
-    if engine.kind.takes("row_angle") and engine.value_of("row_angle") and engine.listed_throws is None:
-        rule, remedy = "cannot stand beside open throws, whose rows would differ", "give throws, or leave it out"
-        raise Refused("engine.row_angle", None, rule, remedy)
+    idle, open_keys = idle_cylinders(engine), [key for key in _OPENABLE if _has_open(engine.value_of(key))]
+    if idle and open_keys:
+        rule = f"cannot be open: cylinder {idle[0]} has no bore and never fires, so even firing leaves its throw open"
+        raise Refused(f"engine.{open_keys[0]}", None, rule, 'fix it, or list the pistons in layout "parts"')
     counts = [count for _, count in cylinder_counts(engine)]
     counts += [len(engine.slider_cranks)] if engine.kind.is_free else []
     if not counts:
@@ -145,8 +146,8 @@ def open_phasing(
         rule = "makes the crank speed uneven, and uneven throws are optimised at even speed only"
         raise Refused("fidelity.crank_inertia", inertia, rule, "remove this key, or fix the throws")
     if engine.kind.fires_evenly and problem.depends_on_firing_order:
-        rule = f"cannot be open in layout '{engine.layout}' while a measure is of a load inside the crankcase"
-        raise Refused("engine.throws", None, rule, "fix the throws, or measure loads on the block")
+        rule = f"cannot be open in layout '{engine.layout}' while loads depend on the firing order"
+        raise Refused("engine.throws", None, rule, "fix the throws, or measure loads on the block of equal gas")
     return problem
 
 
@@ -227,6 +228,16 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
 def _check(phasing: Phasing, engine: EngineTable) -> None:
     """Raise `Refused` for keys of phasing that exclude each other."""
     kind, count = engine.kind, phasing.cylinders
+    if phasing.throws is None and phasing.continuous:
+        layout = phasing.layout(*phasing.minimum_geometry)
+        centres = [layout.throw_centre_turn(pin) for pin in range(len(layout.throw_positions))]
+        if max(centres) > min(centres):
+            key = "row_angle" if kind.takes("row_angle") and engine.value_of("row_angle") else "single_cylinders"
+            rule = (
+                "puts the dead centres of throws at different angles, and firing intervals are searched for equal ones"
+            )
+            remedy = 'fire evenly with throws = "open" and without phasing.intervals, or fix the throws'
+            raise Refused(f"engine.{key}", None, rule, remedy)
     if kind.fires_evenly and phasing.continuous:
         where = "engine.throws" if phasing.throw_bounds is not None else "phasing.intervals"
         rule = f"allows uneven firing, and layout '{engine.layout}' fires evenly"

@@ -26,7 +26,7 @@ from laufruhe.files.fidelity import with_fidelity
 from laufruhe.files.fields import Open
 from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
-from laufruhe.files.gas import gas_of, needs_bore
+from laufruhe.files.gas import SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import load_cases_of, mounts_of
 from laufruhe.files.nested import at, number_at, plain, walk, with_value_at
@@ -139,6 +139,9 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
         raise Refused("geared_inertias", None, rule, "fix the throws, or remove [[geared_inertias]]")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
+    if isinstance(file.gas, TraceTable) and file.gas.cylinder_angles == "common":
+        rule = "counts angles from cylinder 1 in the firing order of the recording, and the crank is open"
+        raise Refused("gas.cylinder_angles", "common", rule, "count each column from the firing of its cylinder")
     closed = partial(_assembled, file, path=path)
     return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
 
@@ -317,6 +320,11 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
         raise Refused("friction", None, "is given, but no operating point uses it", remedy)
     if any(part.swept.piston.bore is None for part in cylinders):
         raise Refused("engine.bore", None, "is missing, but a load at the brake needs the displacement", "add it")
+    if isinstance(file.gas, SeiligerTable | WiebeTable) and any(
+        row.imep is not None for row in file.gas.single_cylinders
+    ):
+        rule = "shares a load at the brake equally, and [[gas.single_cylinders]] have an imep of their own"
+        raise Refused("friction", None, rule, "give the operating points an imep, or remove that of the cylinders")
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
 
 

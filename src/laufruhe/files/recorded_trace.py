@@ -34,7 +34,7 @@ _ROUNDING = 1e-9
 """Noise over the range of the pressure up to which it is that of the arithmetic."""
 _WHOLE = 0.95
 """Least share of the points of the longest cycle that a cycle has."""
-_NEAR_FIRING = math.radians(60.0)
+NEAR_FIRING = math.radians(60.0)
 """Largest angle between the peak pressure and its dead centre at which the peak tells which dead centre it is."""
 _PEG_WIDTH = math.radians(5.0)
 """Angle to either side over which the pressure is averaged to be pegged."""
@@ -229,11 +229,13 @@ class RecordedFile:
 
 def recorded_trace(
     table: RecordedTable, folder: Path, where: str, cycle: Cycle, pace: float, air: float, zero: str | float | None,
+    later: float = 0.0,
 ) -> PressureTrace:  # fmt: skip
     """Return the trace of a recorded file in the folder of a problem, over one cycle over `pace`, without its noise.
 
     `air` is the pressure around [Pa]. `zero` is the crank angle after firing at which the file counts zero [rad], or
-    the name of this dead centre; None leaves it to the peak of the pressure.
+    the name of this dead centre; None leaves it to the peak of the pressure. The file counts from a cylinder that fires
+    `later` [rad] earlier than that of the trace.
     """
     file = RecordedFile(table, folder, where)
     period = cycle.angle / pace
@@ -249,7 +251,9 @@ def recorded_trace(
         file.said.append(f"Noise: {_bar(smooth.noise, 2)} rms, {treatment}.")
     _require_exchange(file, angles, pressures, cycle, period)
     exchange = 0.5 * period if cycle is Cycle.FOUR_STROKE else 0.0
-    angles = angles + _zero(file, angles, pressures, zero, exchange, period)
+    angles = angles - later
+    start = _zero(file, angles, pressures, zero, exchange, period)
+    angles, pressures = _within_cycle(angles + start, pressures, period) if later else (angles + start, pressures)
     if table.peg is not None:
         since = np.mod(angles - table.peg.at + math.pi, period) - math.pi
         rise = table.peg.to - float(np.mean(pressures[np.abs(since) <= max(_PEG_WIDTH, float(np.abs(since).min()))]))
@@ -261,6 +265,14 @@ def recorded_trace(
         raise file.refused(rule, 'write gauge = true, or peg = { at = "-180 deg", to = "1 bar" } with what is known')
     with errors_at_key(f"{where}.file", table.file):
         return PressureTrace(tuple(angles.tolist()), tuple(pressures.tolist()), air, tuple(file.said))
+
+
+def _within_cycle(angles: Array, pressures: Array, period: float) -> tuple[Array, Array]:
+    # the end of a cycle may repeat the beginning
+    last = len(angles) - int(angles[-1] - angles[0] > period * (1.0 - 1e-9))
+    wrapped = np.mod(angles[:last] + 0.5 * period, period) - 0.5 * period
+    order = np.argsort(wrapped)
+    return wrapped[order], pressures[:last][order]
 
 
 def _bar(pressure: float, digits: int = 4) -> str:
@@ -379,9 +391,9 @@ def _zero(
     if zero is not None:
         return exchange if zero == _EXCHANGE else 0.0
     peak = float(angles[int(np.argmax(pressures))])
-    opposite = np.abs(np.remainder(angles - peak - exchange + 0.5 * period, period) - 0.5 * period) < _NEAR_FIRING
+    opposite = np.abs(np.remainder(angles - peak - exchange + 0.5 * period, period) - 0.5 * period) < NEAR_FIRING
     rise = pressures - pressures.min()
-    is_near = abs(math.remainder(peak - exchange, period)) < _NEAR_FIRING
+    is_near = abs(math.remainder(peak - exchange, period)) < NEAR_FIRING
     is_exchange = bool(exchange) and is_near and rise.max() > 2.0 * rise[opposite].max(initial=0.0)
     start = exchange if is_exchange else 0.0
     place = math.degrees(math.remainder(peak + start, period))

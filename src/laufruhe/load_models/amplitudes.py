@@ -21,8 +21,8 @@ from laufruhe.problem.channels import ROCKING_COUPLE, SHAKING_FORCE, SURGING_FOR
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Phasing, Problem
 
-# relative size of the factor of an order that counts as zero
-NEGLIGIBLE = 1e-13
+# relative size of the factor of an order that counts as zero, and relative difference of equal throws
+NEGLIGIBLE, SAME_PLACE = 1e-13, 1e-12
 # largest number of directions of dual vectors
 DIRECTIONS = 400
 _LEVERS: dict[Channel, int] = {SHAKING_FORCE: 0, SURGING_FORCE: 0, ROCKING_COUPLE: 1, SWAYING_COUPLE: 1}
@@ -85,9 +85,9 @@ class AmplitudeObjective:
 def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> AmplitudeObjective | None:
     """Return the objective as norms of the amplitudes |F_h| and |C_h|, or None if it depends on anything else.
 
-    Amplitudes suffice if all of the following hold. Equal throws cause all forces and couples, and only the crank star
-    is open. Limits have the same value for all crank stars that fire evenly. Every term is a root mean square, or has a
-    single order, so that no phase between orders matters.
+    Amplitudes suffice if all of the following hold. Equal throws at symmetric positions cause all forces and couples,
+    and only the crank star is open. Limits have the same value for all crank stars that fire evenly. Every term is a
+    root mean square, or has a single order, so that no phase between orders matters.
     """
     engine = problem.engine
     if problem.decisions or phasing.shafts.optional or not problem.objective:
@@ -105,7 +105,7 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
     if any(x != places[pin] for x, pin in zip(layout.positions, pins, strict=True)):
         return None
     cylinders = tuple(part for part, pin in zip(engine.slider_cranks, pins, strict=True) if pin == 0)
-    if any(type(part) is not SliderCrank for part in cylinders):
+    if any(type(part) is not SliderCrank for part in cylinders) or not _throws_are_alike(engine, layout):
         return None
     if problem.limits:
         # even stars have equal forces if they have equal numbers of throws on the steps
@@ -139,6 +139,19 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
     ]  # fmt: skip
     strong = [AmplitudeTerm(t.weight, tuple(t.force[k] for k in used), tuple(t.couple[k] for k in used)) for t in terms]
     return AmplitudeObjective(tuple(int(orders[k]) for k in used), tuple(strong))
+
+
+def _throws_are_alike(engine: Engine, layout: Layout) -> bool:
+    # equal cylinders and rotating masses on all throws, whose positions equal their mirror image
+    places = layout.throw_positions
+    if any(abs(front + back) > SAME_PLACE * abs(places[0]) for front, back in zip(places, places[::-1], strict=True)):
+        return False
+    cylinders = [
+        [replace(engine.slider_cranks[k], name="", x=0.0, throw=0.0, firing_angle=0.0) for k in layout.on_throw(pin)]
+        for pin in range(len(places))
+    ]
+    sizes = [sum(abs(rotor.unbalance) for rotor in engine.rotors if rotor.x == x) for x in places]
+    return all(c == cylinders[0] for c in cylinders) and max(sizes) - min(sizes) <= SAME_PLACE * max(sizes)
 
 
 def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:

@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from laufruhe.load_models.isolated_cylinders import isolate_cylinder, only_gas_of
+from laufruhe.load_models.isolated_cylinders import isolate_cylinder, motored, only_gas_of
 from laufruhe.load_models.star_model import StarModel, StarNorm, StarProblem, with_upright_angles
 from laufruhe.machine.firing import even_patterns, firing_lattice, slot_order, slot_steps
 from laufruhe.numerics.spectrum import Spectrum
@@ -37,7 +37,7 @@ class FiringModel(StarModel):
     """Loads of all firing orders: a crank star model whose steps are the slots of the cycle.
 
     Loads that do not depend on the firing order are those of the crank star. To loads inside the crankcase, the load of
-    every cylinder is added, later by its slot.
+    every cylinder is added, later by its slot. The same holds for the gas of cylinders that differ.
 
     The parameters are those of `StarModel`: `space` has the allowed firing orders, as stars of slots. `origin` has the
     slot of every cylinder in the firing order from which changes are counted.
@@ -85,7 +85,8 @@ class FiringModel(StarModel):
 
         `star_norms` yields the same measures as functions of the throw angles alone.
         """
-        if not measure.is_inside:
+        gas_differs = self.problem.gas_distinguishes_cylinders and measure.depends_on_gas
+        if not measure.is_inside and not gas_differs:
             return next(star_norms)
         signals = [signal.with_base(self.base) for signal in self._origin_evaluation.signals(measure.load)]
         kinks, count = kinks_of(measure, signals, self.problem.engine), self.space.throws
@@ -118,18 +119,12 @@ class FiringModel(StarModel):
         part = engine.slider_cranks[k]
         first = replace(part, throw=part.throw + part.shaft.ratio * part.firing_angle, firing_angle=0.0)
         # the others keep their places, because the torque of a cylinder passes their journals
-        isolated = isolate_cylinder(engine, k, True, first)
-        signals = []
-        for loads, point in zip(
-            self._origin_evaluation.loads, only_gas_of(self.problem, part.name).points, strict=True
-        ):
-            signal = load.signal(replace(loads, point=point, moving_parts=isolated))
-            if load.depends_on_unbalances:
-                fidelity = replace(loads.fidelity, gas=False, gas_orders=None)
-                motored = load.signal(replace(loads, point=point, moving_parts=isolated, fidelity=fidelity))
-                signal = signal + motored.mapped(np.negative)
-            signals.append(signal.with_base(self.base))
-        return signals
+        isolated, problem = isolate_cylinder(engine, k, True, first), only_gas_of(self.problem, part.name)
+        signals = evaluate(problem, isolated).signals(load)
+        if load.depends_on_unbalances:
+            without_gas = evaluate(motored(problem), isolated).signals(load)
+            signals = [a + b.mapped(np.negative) for a, b in zip(signals, without_gas, strict=True)]
+        return [signal.with_base(self.base) for signal in signals]
 
 
 def _is_of_star(measure: Measure) -> bool:

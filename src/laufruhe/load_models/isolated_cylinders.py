@@ -11,15 +11,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.machine import Chambers, Engine, Rotor, SliderCrank
-from laufruhe.machine.facing import Facing
+from laufruhe.machine.chambers import CylinderGases
 from laufruhe.numerics.arrays import ComplexArray
-from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.problem.problem import Problem
 
 BANK_SAMPLES = (0.0, 0.5 * math.pi, math.pi)
 """Bank angles [rad] whose loads determine the loads at any bank angle: components turn with the bank, or stay."""
-LEAD_DIGITS = 9
-"""Decimal digits to which leads are compared [rad]."""
 
 
 def massless_copy(part: SliderCrank) -> SliderCrank:
@@ -57,6 +54,9 @@ def only_gas_of(problem: Problem, name: str) -> Problem:
     points = []
     for point in problem.points:
         gas = point.gas
+        if isinstance(gas, CylinderGases):
+            gas = gas.of_cylinder(name)
+            point = replace(point, gas=gas)
         if isinstance(gas, Chambers):
             chambers = [replace(chamber, cylinders=(name,)) for chamber in gas.chambers if name in chamber.cylinders]
             point = replace(point, gas=replace(gas, chambers=tuple(chambers)) if chambers else None)
@@ -68,17 +68,3 @@ def only_gas_of(problem: Problem, name: str) -> Problem:
 def motored(problem: Problem) -> Problem:
     """Return the problem without gas forces, as if the engine were motored."""
     return replace(problem, fidelity=replace(problem.fidelity, gas=False, gas_orders=None))
-
-
-def gas_distinguishes_cylinders(problem: Problem) -> bool:
-    """Return True if a measure depends on gas, and the gas pressure differs between cylinders."""
-    if not problem.depends_on_gas:
-        return False
-    gases = [gas for gas in map(problem.fidelity.gas_of, problem.points) if gas is not None]
-    alike = set()
-    for part in problem.engine.cylinders:
-        if isinstance(part.facing, Facing):
-            # without rounding errors in the lead of a facing piston
-            part = replace(part, facing=replace(part.facing, ahead=round(part.facing.ahead, LEAD_DIGITS)))
-        alike.add(tuple(alike_under(gas, part) for gas in gases))
-    return len(alike) > 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -134,4 +134,35 @@ class Chambers:
         return tuple(chamber for chamber in self.chambers if part.name in chamber.cylinders)
 
 
-GasModel: TypeAlias = Seiliger | Wiebe | PressureTrace | Chambers
+CommonGas: TypeAlias = Seiliger | Wiebe | PressureTrace | Chambers
+
+
+@dataclass(frozen=True)
+class CylinderGases:
+    """Gas of an engine whose cylinders differ: the common model, and models of single cylinders by their names."""
+
+    common: CommonGas
+    single: tuple[tuple[str, CommonGas], ...]
+
+    def of_cylinder(self, name: str) -> CommonGas:
+        """Return the gas model of a cylinder."""
+        return dict(self.single).get(name, self.common)
+
+    def mapped(self, change: Callable[[CommonGas], CommonGas]) -> CylinderGases:
+        """Return the gas with every model changed."""
+        return CylinderGases(change(self.common), tuple((name, change(gas)) for name, gas in self.single))
+
+
+GasModel: TypeAlias = CommonGas | CylinderGases
+
+
+def cylinder_gas(gas: GasModel, part: SliderCrank) -> CommonGas:
+    """Return the gas model of a cylinder."""
+    return gas.of_cylinder(part.name) if isinstance(gas, CylinderGases) else gas
+
+
+def models_of(gas: GasModel | None) -> tuple[CommonGas, ...]:
+    """Return the gas models of all cylinders, each once."""
+    if isinstance(gas, CylinderGases):
+        return tuple(dict.fromkeys((gas.common, *(model for _, model in gas.single))))
+    return () if gas is None else (gas,)

@@ -19,7 +19,7 @@ import numpy as np
 from laufruhe.errors import ModelError, counted
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.exact_angles import SAME_TURN, angle_of
+from laufruhe.numerics.exact_angles import SAME_TURN, angle_of, as_turn
 
 MAX_ORDERS = 4096
 """Largest number of firing orders that are ranked for a crank star, or solved one by one."""
@@ -57,17 +57,16 @@ def firing_lattice(cycle: Cycle, cylinders: int) -> FiringLattice:
 def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], ...]:
     """Return the dead centres of each throw's cylinders (S6).
 
-    Values are steps after cylinder 1, for a throw at the angle of throw 1.
+    Values are steps after the first cylinder of the throw.
 
     Raises
     ------
     NoEvenStarError
         If the angle between two cylinders of one throw is no whole number of steps.
     """
-    first = layout.dead_centre_turn(0)
     out = []
     for pin in range(len(layout.throw_positions)):
-        steps = []
+        steps, first = [], layout.throw_centre_turn(pin)
         for k in (k for k, throw in enumerate(layout.pins) if throw == pin):
             distance = (layout.dead_centre_turn(k) - first) * lattice.steps
             nearest = round(float(distance))
@@ -75,7 +74,7 @@ def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], 
                 raise NoEvenStarError(
                     "even firing needs the angle between dead centres on one throw (bank angle plus split pins, or "
                     f"leads of cranks) to be a multiple of {360.0 / lattice.steps:g} deg, and they make "
-                    f"{math.degrees(angle_of(layout.dead_centre_turn(0) - layout.dead_centre_turn(k))):.6g} deg; "
+                    f"{math.degrees(angle_of(first - layout.dead_centre_turn(k))):.6g} deg; "
                     "change or open one of these angles, or allow uneven intervals"
                 )
             steps.append(nearest % lattice.steps)
@@ -128,8 +127,16 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
 
 def star_throws(layout: Layout, steps: Sequence[int], lattice_steps: int) -> tuple[float, ...]:
     """Return the throw angles of a crank star [rad], cylinder 1 at its dead centre at phi = 0 (C5)."""
-    first = layout.dead_centre_turn(0)
-    return tuple(angle_of((first + Fraction(int(step), lattice_steps)) % 1) for step in steps)
+    return tuple(
+        angle_of((layout.throw_centre_turn(pin) + Fraction(int(step), lattice_steps)) % 1)
+        for pin, step in enumerate(steps)
+    )
+
+
+def star_steps(layout: Layout, throws: Sequence[float], lattice_steps: int) -> tuple[int, ...]:
+    """Return the steps of a crank star from its throw angles [rad], the first throw on step 0; see `star_throws`."""
+    turns = [as_turn(angle) - layout.throw_centre_turn(pin) for pin, angle in enumerate(throws)]
+    return tuple(round(float(turn - turns[0]) * lattice_steps) % lattice_steps for turn in turns)
 
 
 def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[tuple[int, ...]]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Chambers, Charge, Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
+from laufruhe.machine.chambers import cylinder_gas
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.cylinder_volume import dead_centres
 from laufruhe.physics.pressure_trace import trace_pressure
@@ -25,7 +26,7 @@ from laufruhe.physics.working_chambers import chambers_breaks, chambers_thrust
 OneChamber: TypeAlias = Seiliger | Wiebe | PressureTrace
 
 
-def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
+def pressure_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
     """Return the absolute cylinder pressure [Pa] at crank angles after firing [rad], shape of `angles`.
 
     Raises
@@ -33,7 +34,10 @@ def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: Array)
     ModelError
         If the model cannot meet its indicated mean pressure, or a trace does not cover the cycle.
     """
-    gas, piston, cycle, pace = _worked(gas, part, cycle)
+    model = cylinder_gas(gas, part)
+    if isinstance(model, Chambers):
+        raise ModelError(f"{part.name} has chambers, which have a pressure each")
+    gas, piston, cycle, pace = _worked(model, part, cycle)
     angles = angles - part.swept.firing_delay
     if isinstance(gas, PressureTrace):
         return trace_pressure(gas, cycle, angles, pace)
@@ -58,6 +62,7 @@ def chamber_cycle_of(part: SliderCrank, cycle: Cycle) -> tuple[Cycle, float]:
 
 def check_chamber(gas: GasModel, part: SliderCrank) -> None:
     """Refuse a compression ratio that the shape of a chamber does not allow (Y2)."""
+    gas = cylinder_gas(gas, part)
     if isinstance(gas, Charge) and gas.compression_ratio > part.largest_ratio:
         raise ModelError(
             f"{gas.compression_ratio:g} leaves {part.name} no chamber, whose shape allows "
@@ -67,6 +72,7 @@ def check_chamber(gas: GasModel, part: SliderCrank) -> None:
 
 def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
     """Return the gas force on a piston rod along the axis, away from the crank [N], as `pressure_at` (B1, G14)."""
+    gas = cylinder_gas(gas, part)
     if isinstance(gas, Chambers):
         return chambers_thrust(gas, part, angles)
     return np.asarray(-part.swept.piston.piston_area * (pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure))
@@ -74,11 +80,10 @@ def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> 
 
 def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
     """Return a key that is equal for cylinders with equal gas forces over their own angle."""
-    return (
-        part.path,
-        part.facing,
-        tuple((c.end, c.bore, c.rod, c.diagram) for c in gas.of(part)) if isinstance(gas, Chambers) else part.bore,
-    )
+    model = cylinder_gas(gas, part)
+    if isinstance(model, Chambers):
+        return part.path, part.facing, tuple((c.end, c.bore, c.rod, c.diagram) for c in model.of(part))
+    return part.path, part.facing, part.bore, model if model is not gas else None
 
 
 def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> Array:
@@ -86,8 +91,10 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> Array:
 
     Ends of strokes, where valves open and heat comes at once; cut-off; begin and end of a burn; points of a trace.
     """
+    gas = cylinder_gas(gas, part)
     if isinstance(gas, Chambers):
-        return chambers_breaks(gas, part)
+        turns = math.tau * np.arange(cycle.turns)
+        return np.ravel(chambers_breaks(gas, part)[:, None] + turns)
     gas, piston, cycle, pace = _worked(gas, part, cycle)
     if isinstance(gas, PressureTrace):
         breaks = np.array(gas.angles)

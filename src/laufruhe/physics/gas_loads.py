@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
+from laufruhe.machine.chambers import cylinder_gas
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.exact_angles import Turn, as_turn, star_orders
 from laufruhe.numerics.spectrum import Mapped, Spectrum, shared, spectrum_with_kinks
@@ -65,7 +66,7 @@ def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: F
     Angles count from its firing: a cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
     key = _CylinderKey((type(part), alike_under(gas, part), part.shaft.ratio), part)
-    return fidelity.truncated_gas(_one_cylinder(gas, key, cycle, fidelity.gas_steps))
+    return fidelity.truncated_gas(_one_cylinder(cylinder_gas(gas, part), key, cycle, fidelity.gas_steps))
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from laufruhe.machine import Engine, OperatingPoint, PressureTrace
+from laufruhe.machine.chambers import CylinderGases
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import chamber_cycle_of
 from laufruhe.physics.gas_loads import gas_coefficients
@@ -37,6 +38,22 @@ class GasFacts:
     power: float
     displacement: float
     recording: tuple[str, ...]
+
+
+def cylinder_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> list[tuple[str, GasFacts]]:
+    """Return the key figures of recorded traces at an operating point, after its name; of each cylinder if they differ.
+
+    The list is empty without a recorded trace.
+    """
+    gas, engines = fidelity.gas_of(point), [(point.name, point, engine)]
+    if isinstance(gas, CylinderGases):
+        engines = [
+            (f"{point.name}, {part.name}", replace(point, gas=gas.of_cylinder(part.name)), alone)
+            for part in engine.cylinders
+            for alone in [replace(engine, slider_cranks=(part,))]
+        ]
+    facts = ((name, gas_facts(alone, one_point, fidelity)) for name, one_point, alone in engines)
+    return [(name, figures) for name, figures in facts if figures is not None]
 
 
 def gas_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> GasFacts | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from laufruhe.physics.recorded_gas import GasFacts, gas_facts
+from laufruhe.physics.recorded_gas import GasFacts, cylinder_facts
 from laufruhe.present.numbers import DEGREE, trimmed
 from laufruhe.problem.problem import Problem
 
@@ -32,8 +32,7 @@ def gas_lines(problem: Problem) -> list[str]:
 
 
 def _facts(problem: Problem) -> list[tuple[str, GasFacts]]:
-    facts_of = ((point.name, gas_facts(problem.engine, point, problem.fidelity)) for point in problem.points)
-    return [(name, facts) for name, facts in facts_of if facts is not None]
+    return [row for point in problem.points for row in cylinder_facts(problem.engine, point, problem.fidelity)]
 
 
 def _figures(facts: GasFacts) -> list[str]:

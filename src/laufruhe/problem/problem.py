@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import Complaint, ModelError, counted, wrong_call
-from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint, SliderCrank
+from laufruhe.machine.facing import Facing
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.problem.decision import Decision, Numbers, apply_decisions
 from laufruhe.problem.goals import Goals
@@ -42,6 +44,8 @@ class Drawing:
     mount_numbers: tuple[tuple[float, ...], ...]
 
 
+LEAD_DIGITS = 9
+"""Decimal digits to which leads are compared [rad]."""
 Rebuild: TypeAlias = Callable[[Mapping[Path, str | float]], Drawing]
 """Function that returns the drawing of a problem file with other numbers at some addresses."""
 
@@ -55,6 +59,16 @@ def _with_changes(
     rebuild: Rebuild, earlier: Mapping[Path, str | float], changes: Mapping[Path, str | float]
 ) -> Drawing:
     return rebuild({**earlier, **changes})
+
+
+def _without_rounding(part: SliderCrank) -> SliderCrank:
+    # without rounding errors in the lead of a facing piston
+    facing = part.facing
+    return (
+        replace(part, facing=replace(facing, ahead=round(facing.ahead, LEAD_DIGITS)))
+        if isinstance(facing, Facing)
+        else part
+    )
 
 
 class Extra:
@@ -307,9 +321,30 @@ class Problem(Goals):
         )
 
     @property
+    def gas_distinguishes_cylinders(self) -> bool:
+        """True if a measure depends on gas, and the gas pressure differs between cylinders."""
+        gases = [gas for gas in map(self.fidelity.gas_of, self.points) if gas is not None]
+        if not gases or not self.depends_on_gas:
+            return False
+        parts = map(_without_rounding, self.engine.cylinders)
+        return len({tuple(alike_under(gas, part) for gas in gases) for part in parts}) > 1
+
+    @property
+    def cylinders_are_alike(self) -> bool:
+        """True if cylinders have equal masses, lengths and gas, so that they differ in place and firing alone."""
+        parts = {
+            replace(_without_rounding(part), name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0, shaft=CRANKSHAFT)
+            for part in self.engine.cylinders
+        }
+        return len(parts) <= 1 and not self.gas_distinguishes_cylinders
+
+    @property
     def depends_on_firing_order(self) -> bool:
-        """True if a measure depends on a crank star's firing order: torsion, loads inside the crankcase with gas."""
-        if any(measure.is_cylinder_resolved for measure in self.measures):
+        """True if a measure depends on a crank star's firing order.
+
+        It does with torsion, loads inside the crankcase with gas, and gas that differs between cylinders.
+        """
+        if self.gas_distinguishes_cylinders or any(measure.is_cylinder_resolved for measure in self.measures):
             return True
         loads = [measure.load for measure in self.measures if measure.is_inside]
         return (self.has_gas and bool(loads)) or not all(load.depends_on_unbalances for load in loads)

@@ -22,7 +22,8 @@ def inline(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, cylinder_spacing: Value | None = None, row_angle: Value | None = None,
+    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
     first_end: Literal["front", "flywheel"] | None = None, pivot_distance: Value | None = None,
@@ -70,8 +71,11 @@ def inline(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     row_angle
         Angle between the two rows of a bank whose cylinders lean alternately to the left and right (VR and W engines);
         negative if the front cylinder leans to the right [rad].
@@ -107,7 +111,8 @@ def vee(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, cylinder_spacing: Value | None = None, row_angle: Value | None = None,
+    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
     first_end: Literal["front", "flywheel"] | None = None, bank_angle: Value | None = None,
@@ -157,8 +162,11 @@ def vee(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     row_angle
         Angle between the two rows of a bank whose cylinders lean alternately to the left and right (VR and W engines);
         negative if the front cylinder leans to the right [rad].
@@ -202,7 +210,8 @@ def boxer(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, cylinder_spacing: Value | None = None,
+    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
     first_end: Literal["front", "flywheel"] | None = None, bank_stagger: Value | None = None,
@@ -251,8 +260,11 @@ def boxer(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     numbering
         Numbers of the cylinders in this file: by bank, alternating between banks, or the number of each cylinder in a
         list, bank by bank from the front, the left bank first.
@@ -289,7 +301,8 @@ def opposed_piston(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, cylinder_spacing: Value | None = None, row_angle: Value | None = None,
+    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
     first_end: Literal["front", "flywheel"] | None = None, crank_distance: Value | None = None,
@@ -339,8 +352,11 @@ def opposed_piston(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     row_angle
         Angle between the two rows of a bank whose cylinders lean alternately to the left and right (VR and W engines);
         negative if the front cylinder leans to the right [rad].
@@ -386,10 +402,10 @@ def delta(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, fires_together: bool | None = None,
-    cylinder_spacing: Value | None = None, crank_distance: Value | None = None, reversed_crank: int | None = None,
-    crank_leads: Values | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    single_cylinders: Sequence[Table] | None = None, cylinder_spacing: Value | Values | None = None,
+    crank_distance: Value | None = None, reversed_crank: int | None = None, crank_leads: Values | None = None,
+    pivot_distance: Value | None = None, return_ratio: Value | None = None, lever_length: Value | None = None,
+    lever: Table | None = None, lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout delta.
 
@@ -429,8 +445,11 @@ def delta(
         Numbers of the cylinders in the order in which they fire, or "open".
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     crank_distance
         Distance of the two cranks of opposed pistons [m].
     reversed_crank
@@ -460,7 +479,7 @@ def radial(
     offset: Value | None = None, reciprocating_mass: Value | None = None, rotating_mass: Value | None = None,
     rod: Table | None = None, big_end: Table | None = None, rod_inertia_deficit: Value | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None,
+    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None, knuckle_radius: Value | None = None,
     master_cylinder: int | None = None, knuckle_angles: Values | None = None,
@@ -508,6 +527,8 @@ def radial(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     numbering
         Numbers of the cylinders in this file: by bank, alternating between banks, or the number of each cylinder in a
         list, bank by bank from the front, the left bank first.
@@ -550,7 +571,8 @@ def x_engine(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, cylinder_spacing: Value | None = None,
+    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
     first_end: Literal["front", "flywheel"] | None = None, first_bank: Literal["left", "right"] | None = None,
@@ -598,8 +620,11 @@ def x_engine(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     numbering
         Numbers of the cylinders in this file: by bank, alternating between banks, or the number of each cylinder in a
         list, bank by bank from the front, the left bank first.
@@ -633,9 +658,9 @@ def parts(
     rod: Table | None = None, big_end: Table | None = None, rod_inertia_deficit: Value | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
     fires_together: bool | None = None, shafts: Sequence[Table] | None = None,
-    slider_cranks: Sequence[Table] | None = None, pivot_distance: Value | None = None,
-    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
-    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
+    slider_cranks: Sequence[Table] | None = None, single_cylinders: Sequence[Table] | None = None,
+    pivot_distance: Value | None = None, return_ratio: Value | None = None, lever_length: Value | None = None,
+    lever: Table | None = None, lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout parts.
 
@@ -680,6 +705,8 @@ def parts(
         Crankshafts of a free list of parts.
     slider_cranks
         Slider-cranks of a free list of parts.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     pivot_distance
         From the crank axis to the pivot of a swinging yoke [m].
     return_ratio
@@ -702,7 +729,8 @@ def rotary(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, cylinder_spacing: Value | None = None, row_angle: Value | None = None,
+    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
     first_end: Literal["front", "flywheel"] | None = None, eccentricity: Value | None = None,
@@ -732,8 +760,11 @@ def rotary(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     row_angle
         Angle between the two rows of a bank whose cylinders lean alternately to the left and right (VR and W engines);
         negative if the front cylinder leans to the right [rad].
@@ -770,7 +801,8 @@ def engine(
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
     fires_together: bool | None = None, shafts: Sequence[Table] | None = None,
-    slider_cranks: Sequence[Table] | None = None, cylinder_spacing: Value | None = None, row_angle: Value | None = None,
+    slider_cranks: Sequence[Table] | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
     first_end: Literal["front", "flywheel"] | None = None, bank_angle: Value | None = None,
@@ -833,8 +865,11 @@ def engine(
         Crankshafts of a free list of parts.
     slider_cranks
         Slider-cranks of a free list of parts.
+    single_cylinders
+        Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
-        Distance between neighbouring throws; in a boxer between neighbours of a bank [m].
+        Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front
+        [m].
     row_angle
         Angle between the two rows of a bank whose cylinders lean alternately to the left and right (VR and W engines);
         negative if the front cylinder leans to the right [rad].

@@ -99,7 +99,8 @@ class EngineParts(Parts):
         return self._with("operating_points", "operating_point", keys_of(locals()))
 
     def gas_seiliger(
-        self, *, peak_pressure: Value, imep: Value, compression_ratio: Value | None = None,
+        self, *, peak_pressure: Value, imep: Value, single_cylinders: Sequence[Table] | None = None,
+        chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
         intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
         crankcase_pressure: Value | None = None, compression_exponent: Value | None = None,
         expansion_exponent: Value | None = None,
@@ -114,6 +115,10 @@ class EngineParts(Parts):
             Largest absolute pressure of the cycle [Pa].
         imep
             Indicated mean effective pressure [Pa].
+        single_cylinders
+            Cylinders whose gas differs; missing keys are those of [gas].
+        chambers
+            Chambers of pistons that never fire, such as those of a compressor: cylinders with bore 0.
         compression_ratio
             Largest over smallest volume of the cylinder.
         intake_pressure
@@ -130,7 +135,8 @@ class EngineParts(Parts):
         return self._with("gas", "gas_seiliger", keys_of(locals(), {'model': 'seiliger'}))
 
     def gas_wiebe(
-        self, *, imep: Value, start: Value, duration: Value, compression_ratio: Value | None = None,
+        self, *, imep: Value, start: Value, duration: Value, single_cylinders: Sequence[Table] | None = None,
+        chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
         intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
         crankcase_pressure: Value | None = None, shape: Value | None = None, completeness: Value | None = None,
         heat_ratio: Value | None = None,
@@ -147,6 +153,10 @@ class EngineParts(Parts):
             Crank angle at which the burn starts, after the dead centre [rad].
         duration
             Crank angle from the start of the burn to its end [rad].
+        single_cylinders
+            Cylinders whose gas differs; missing keys are those of [gas].
+        chambers
+            Chambers of pistons that never fire, such as those of a compressor: cylinders with bore 0.
         compression_ratio
             Largest over smallest volume of the cylinder.
         intake_pressure
@@ -165,11 +175,13 @@ class EngineParts(Parts):
         return self._with("gas", "gas_wiebe", keys_of(locals(), {'model': 'wiebe'}))
 
     def gas_trace(
-        self, *, file: str, sheet: str | None = None, angle_column: str | int | None = None,
+        self, *, file: str, single_cylinders: Sequence[Table] | None = None, chambers: Sequence[Table] | None = None,
+        sheet: str | None = None, angle_column: str | int | None = None,
         pressure_column: str | int | Sequence[str | int] | None = None, angle_unit: str | None = None,
         pressure_unit: str | None = None, gauge: bool | None = None, peg: Table | None = None,
         cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
         angle_zero: Number | None = None, crankcase_pressure: Value | None = None,
+        cylinder_columns: Sequence[str | int] | None = None, cylinder_angles: Literal["own", "common"] | None = None,
     ) -> Self:
         """Return the engine with gas trace.
 
@@ -179,6 +191,10 @@ class EngineParts(Parts):
         ----------
         file
             Text file, .xlsx or .mat file of crank angle and pressure, beside the problem.
+        single_cylinders
+            Cylinders whose gas differs; missing keys are those of [gas].
+        chambers
+            Chambers of pistons that never fire, such as those of a compressor: cylinders with bore 0.
         sheet
             Sheet of a spreadsheet; by default that with the most rows of numbers.
         angle_column
@@ -201,6 +217,11 @@ class EngineParts(Parts):
             Crank angle after firing at which the file counts zero, or its dead centre: "firing" or "gas exchange".
         crankcase_pressure
             Absolute pressure behind the piston [Pa].
+        cylinder_columns
+            Names or numbers of the columns with the pressures of cylinders 1, 2, 3, ..., in place of pressure_column.
+        cylinder_angles
+            Firing from which the angles of cylinder_columns count: each from that of its cylinder ("own"), or all from
+            that of cylinder 1 ("common").
         """
         return self._with("gas", "gas_trace", keys_of(locals(), {'model': 'trace'}))
 

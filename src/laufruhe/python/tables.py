@@ -503,6 +503,76 @@ def shank(
     return keys_of(locals())
 
 
+def single_cylinder(
+    *, cylinders: int | Sequence[int], bore: Value | None = None, stroke: Value | None = None,
+    rod_ratio: Value | None = None, rod_length: Value | None = None, offset: Value | None = None,
+    reciprocating_mass: Value | None = None, rotating_mass: Value | None = None, rod: Table | None = None,
+    rod_inertia_deficit: Value | None = None, second_reciprocating_mass: Value | None = None,
+    articulated_rod: Table | None = None, knuckle_mass: Value | None = None, rotor_mass: Value | None = None,
+    rotor_inertia: Value | None = None,
+) -> Table:
+    """Return a table `single_cylinder`.
+
+    Cylinders that differ from the others; missing keys are those of [engine].
+
+    Parameters
+    ----------
+    cylinders
+        Their numbers; with two pistons in a cylinder the keys count for both.
+    bore
+        Diameter of the cylinder; 0 for a piston on which no gas acts [m].
+    stroke
+        Travel of the piston: twice the crank radius [m].
+    rod_ratio
+        Crank radius over rod length.
+    rod_length
+        Distance of the two bearings of the rod [m].
+    offset
+        Offset at the crank radius of [engine], or at that of a stroke beside it [m].
+    reciprocating_mass
+        Reciprocating mass as weighed; rotating_mass has the rest [kg].
+    rotating_mass
+        Rotating mass that belongs to this cylinder, by default an equal share of that of its throw [kg].
+    rod
+        Connecting rod as a rigid body.
+    rod_inertia_deficit
+        What two masses at the ends of the rod lack of its inertia [kg m^2].
+    second_reciprocating_mass
+        Reciprocating mass of each piston of the second crank; by default that of the others [kg].
+    articulated_rod
+        Articulated rod as a rigid body, counted from its knuckle pin.
+    knuckle_mass
+        Mass at every knuckle pin, beside the share of articulated_rod [kg].
+    rotor_mass
+        Mass of a rotor with its seals; rotating_mass is that of the eccentric [kg].
+    rotor_inertia
+        Moment of inertia of a rotor about its centre [kg m^2].
+    """
+    return keys_of(locals())
+
+
+def single_gas(
+    *, cylinders: int | Sequence[int], imep: Value | None = None, peak_pressure: Value | None = None,
+    compression_ratio: Value | None = None,
+) -> Table:
+    """Return a table `single_gas`.
+
+    Cylinders whose gas differs; missing keys are those of [gas].
+
+    Parameters
+    ----------
+    cylinders
+        Their numbers.
+    imep
+        Indicated mean effective pressure of these cylinders [Pa].
+    peak_pressure
+        Peak pressure of these cylinders, with model seiliger [Pa].
+    compression_ratio
+        Largest over smallest volume of the cylinder.
+    """
+    return keys_of(locals())
+
+
 def slider_crank(
     *, x: Value, bank_angle: Value | None = None, throw: Value | None = None, firing_angle: Value | None = None,
     shaft: str | None = None, stroke: Value | None = None, bore: Value | None = None, rod_ratio: Value | None = None,

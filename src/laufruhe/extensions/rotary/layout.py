@@ -20,6 +20,7 @@ class Rotary(Inline):
 
     name = "rotary"
     has_pistons = False
+    single = ("rotor_mass", "rotor_inertia", "rotating_mass")
     keys = (
         *Inline.keys,
         LayoutKey("eccentricity", "positive length", "Eccentricity of the shaft under every rotor."),

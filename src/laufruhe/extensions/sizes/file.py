@@ -156,8 +156,17 @@ def _read(table: RunningGearTable | None, problem: Problem, context: ExtensionCo
         check_factors(context.file.counterweights, "counts masses that follow from sizes, which are open")
     gear = RunningGear() if table is None else _gear_of(table, engine.slider_cranks, throws)
     if decisions or table is not None:
+        _require_one_shape(context.engine)
         engine = engine.with_extra(gear)
     return replace(problem, engine=engine, decisions=(*problem.decisions, *decisions))
+
+
+def _require_one_shape(table: EngineTable) -> None:
+    for k, row in enumerate(table.single_cylinders, 1):
+        for key in ("stroke", "rod_ratio", "rod_length", "offset", "rod"):
+            if getattr(row, key) is not None:
+                rule = "is that of a single cylinder, and sizes of the running gear are those of all"
+                raise Refused(f"engine.single_cylinders[{k}].{key}", None, rule, "leave it out, or fix the sizes")
 
 
 def _decisions(

@@ -19,16 +19,18 @@ from laufruhe.machine.layouts.base import (
     LayoutKind,
 )
 from laufruhe.machine.layouts.places import Layout, stations
-from laufruhe.machine.slider_crank import SliderCrank
 
 STAGGER = LayoutKey("bank_stagger", "length")
 X_BANKS = tuple(math.radians(angle) for angle in (45.0, -45.0, 135.0, -135.0))
 
 
-def in_banks(name: str, cylinders: int, spacing: float, banks: Sequence[float], stagger: float = 0.0) -> Layout:
+def in_banks(
+    name: str, cylinders: int, spacing: float | Sequence[float], banks: Sequence[float], stagger: float = 0.0
+) -> Layout:
     """Return the layout of cylinder banks at these angles [rad] on shared throws, numbered bank by bank.
 
-    The throws are `spacing` apart; the first of two banks stands forward by `stagger` [m].
+    The throws are `spacing` apart, one distance or each from the front [m]. The first of two banks stands forward by
+    `stagger` [m].
     """
     throws, others = divmod(cylinders, len(banks))
     if others or not throws:
@@ -45,12 +47,18 @@ def in_banks(name: str, cylinders: int, spacing: float, banks: Sequence[float], 
     )
 
 
-def inline(cylinders: int, spacing: float) -> Layout:
+def inline(cylinders: int, spacing: float | Sequence[float]) -> Layout:
     """Return a single upright bank."""
     return in_banks("inline", cylinders, spacing, (0.0,))
 
 
-def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
+def vee(
+    cylinders: int,
+    spacing: float | Sequence[float],
+    bank_angle: float,
+    split_pin: float = 0.0,
+    bank_stagger: float = 0.0,
+) -> Layout:
     """Return two banks on shared or split pins.
 
     The left bank, leaning to +y, has numbers 1 to n/2. Its pins are behind those of the right bank by the angle of
@@ -61,7 +69,7 @@ def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.
     return replace(layout, sides=sides, pin_offsets=tuple(-side * split_pin for side in sides))
 
 
-def boxer(cylinders: int, spacing: float, bank_stagger: float) -> Layout:
+def boxer(cylinders: int, spacing: float | Sequence[float], bank_stagger: float) -> Layout:
     """Return two opposed banks, with every cylinder on a throw of its own and opposed pistons in step."""
     layout = in_banks("boxer", cylinders, spacing, (0.5 * math.pi, -0.5 * math.pi), bank_stagger)
     return replace(layout, pins=tuple(range(cylinders)), throw_positions=layout.positions)
@@ -73,19 +81,17 @@ def in_rows(layout: Layout, inputs: LayoutInput) -> Layout:
     A row leans by half of the angle between rows. An offset lies on the outer side of every row, so that pistons reach
     their dead centre later than the axis says.
     """
-    angle, mechanism = inputs.options["row_angle"], inputs.mechanism
+    angle = inputs.options["row_angle"]
     if not angle:
         return layout
     # throws are still counted from the front
     leans = [0.5 * angle * (-1.0) ** pin for pin in layout.pins]
     layout = replace(layout, banks=tuple(bank + lean for bank, lean in zip(layout.banks, leans, strict=True)))
-    if mechanism.offset == 0.0:
+    offsets = [inputs.at_place(place).mechanism.offset for place in range(inputs.cylinders)]
+    if not any(offsets):
         return layout
-    if mechanism.kind is not SliderCrank:
-        raise KeyedError("row_angle", "with an offset needs a slider-crank; leave the offset out")
-    offsets = tuple(math.copysign(mechanism.offset, lean * mechanism.offset) for lean in leans)
-    parts = [replace(mechanism, offset=offset).cylinder(1, 0.0, 0.0, 0.0, 0.0) for offset in offsets]
-    return replace(layout, offsets=offsets, firing_delays=tuple(part.dead_centres[0] for part in parts))
+    signed = (math.copysign(offset, lean * offset) for offset, lean in zip(offsets, leans, strict=True))
+    return replace(layout, offsets=tuple(signed))
 
 
 class Inline(LayoutKind):

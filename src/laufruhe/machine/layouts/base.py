@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from laufruhe import units
@@ -23,9 +23,9 @@ class LayoutKey:
     Attributes
     ----------
     kind
-        "length", "positive length", "non-negative length", "angle", "open angle", "open lead", "angles", "cylinder",
-        "sign", "inertia", "ratio", "mass", "open mass", "rod" of a mass, centre of gravity and inertia, or "numbering",
-        "bank", "end" or "rotation" of cylinder numbers.
+        "length", "positive length", "positive lengths", "non-negative length", "angle", "open angle", "open lead",
+        "angles", "cylinder", "sign", "inertia", "ratio", "mass", "open mass", "rod" of a mass, centre of gravity and
+        inertia, or "numbering", "bank", "end" or "rotation" of cylinder numbers.
     default
         Value if the file leaves the key out.
     """
@@ -38,8 +38,8 @@ class LayoutKey:
 
 SPACING = LayoutKey(
     "cylinder_spacing",
-    "positive length",
-    "Distance between neighbouring throws; in a boxer between neighbours of a bank.",
+    "positive lengths",
+    "Distance between neighbouring throws; in a boxer between neighbours of a bank. A list has each, from the front.",
 )
 NUMBERING = (
     LayoutKey(
@@ -60,6 +60,10 @@ FIRST_END = LayoutKey("first_end", "end", "End of the engine at which cylinder 1
 FIRST_BANK = LayoutKey(
     "first_bank", "bank", "Bank of cylinder 1, seen from the flywheel towards the front; left by default."
 )
+OF_CYLINDER = (
+    "bore", "stroke", "rod_ratio", "rod_length", "reciprocating_mass", "rotating_mass", "rod", "rod_inertia_deficit",
+)  # fmt: skip
+"""Keys of [engine] that a cylinder of any layout on plain cranks may have of its own; the offset is one more."""
 CRANK_DISTANCE = LayoutKey("crank_distance", "positive length", "Distance of the two cranks of opposed pistons.")
 
 
@@ -81,6 +85,8 @@ class LayoutInput:
         Connecting rod, if the file gives it as a rigid body.
     gas
         True if gas acts on the pistons.
+    single
+        Description of each cylinder that has numbers of its own, by its index.
     """
 
     cycle: Cycle
@@ -93,13 +99,32 @@ class LayoutInput:
     piston_mass: float = 0.0
     rod: Rod | None = None
     gas: bool = False
+    single: Mapping[int, LayoutInput] = field(default_factory=dict)
 
-    def spacing(self, places: int) -> float:
-        """Return the distance between neighbouring throws along the crank [m]; 1 for a single throw."""
-        distance = self.options["cylinder_spacing"]
-        if distance is None and places > 1:
-            raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
-        return 1.0 if distance is None else float(distance)
+    def spacing(self, places: int) -> float | tuple[float, ...]:
+        """Return the distance between neighbouring throws along the crank, or each distance from the front [m].
+
+        It is 1 for a single throw.
+        """
+        distances = self.options["cylinder_spacing"]
+        if distances is None:
+            if places > 1:
+                raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
+            return 1.0
+        if len(distances) == 1:
+            return float(distances[0])
+        if len(distances) != places - 1:
+            rule = f"has {counted(len(distances), 'distance')} between {counted(places, 'place')} along the crank"
+            raise KeyedError("cylinder_spacing", f"{rule}; give {places - 1}, or one for all")
+        return tuple(distances)
+
+    def of(self, k: int) -> LayoutInput:
+        """Return the description of cylinder k (from zero), which may have numbers of its own."""
+        return self.single.get(k, self)
+
+    def at_place(self, place: int) -> LayoutInput:
+        """Return the description of the cylinder at a place of the layout (C3)."""
+        return self.of(self.places.index(place))
 
     @property
     def crank_distance(self) -> float:
@@ -142,6 +167,8 @@ class LayoutKind(ABC):
         True if the layout needs a drive with a connecting rod.
     has_pistons
         True if [engine] gives pistons, rods and strokes; else keys of the layout alone give the mechanism.
+    single
+        Keys of [engine] that a single cylinder may have of its own.
     """
 
     name: ClassVar[str]
@@ -154,6 +181,7 @@ class LayoutKind(ABC):
     fires_evenly: ClassVar[bool] = False
     needs_rod: ClassVar[bool] = False
     has_pistons: ClassVar[bool] = True
+    single: ClassVar[tuple[str, ...]] = (*OF_CYLINDER, "offset")
 
     def takes(self, key: str) -> bool:
         """Return True if the layout takes a key."""
@@ -184,7 +212,33 @@ class LayoutKind(ABC):
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the slider-cranks and the throws that they work on."""
-        return build(inputs.cycle, layout, inputs.mechanism, throws, inputs.firing_order, inputs.firing_intervals)
+        mechanisms = [inputs.of(k).mechanism for k in range(inputs.cylinders)]
+        return build(inputs.cycle, layout, mechanisms, throws, inputs.firing_order, inputs.firing_intervals)
+
+    def layout(self, inputs: LayoutInput) -> Layout:
+        """Return the layout by cylinder numbers, with the dead centres of cylinders of different offset."""
+        layout = _with_dead_centres(self.place(inputs), inputs)
+        return layout if list(inputs.places) == sorted(inputs.places) else layout.renumbered(inputs.places)
+
+
+def _with_dead_centres(layout: Layout, inputs: LayoutInput) -> Layout:
+    """Return the layout with the offset and true dead centre of every cylinder, if these differ."""
+    mechanisms = [inputs.at_place(place).mechanism for place in range(inputs.cylinders)]
+    offsets = layout.offsets or tuple(mechanism.offset for mechanism in mechanisms)
+    if layout.firing_delays or not any(offsets):
+        return layout
+    if any(mechanism.kind is not SliderCrank for mechanism in mechanisms):
+        if layout.offsets or inputs.single:
+            raise KeyedError("offset", "needs a slider-crank if cylinders differ; leave the offset out")
+        return layout
+    parts = (
+        replace(mechanism, offset=offset).cylinder(1, 0.0, 0.0, 0.0, 0.0)
+        for mechanism, offset in zip(mechanisms, offsets, strict=True)
+    )
+    delays = tuple(part.dead_centres[0] for part in parts)
+    if len(set(delays)) == 1 and not layout.offsets:
+        return layout
+    return replace(layout, offsets=offsets, firing_delays=delays)
 
 
 class Parts(LayoutKind):

@@ -18,7 +18,7 @@ from laufruhe.numerics.exact_angles import SAME_TURN, Turn, angle_of, as_turn, c
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Numbers that all cylinders of an engine share.
+    """Numbers of a cylinder, which all cylinders of an engine share unless some have their own.
 
     Attributes
     ----------
@@ -28,6 +28,8 @@ class Mechanism:
         Reciprocating mass per cylinder [kg].
     rotating_mass
         Rotating mass per throw without rods, at the crank radius [kg].
+    pin_mass
+        Part of the rotating mass of its throw that belongs to this cylinder [kg]; None for an equal share.
     rod_rotating_mass
         Share of the rod at the crank pin, per cylinder [kg].
     rod_inertia_deficit
@@ -49,6 +51,11 @@ class Mechanism:
     big_end: tuple[float, float] | None = None
     kind: type[SliderCrank] = SliderCrank
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    pin_mass: float | None = None
+
+    def mass_at_pin(self, cylinders: int) -> float:
+        """Return the rotating mass without rods that belongs to this one of several cylinders on a throw [kg]."""
+        return self.rotating_mass / cylinders if self.pin_mass is None else self.pin_mass
 
     def cylinder(
         self,
@@ -148,6 +155,10 @@ def even_throws(
                 f"cylinder {neighbour} on the same throw at {math.degrees(angle_of(first)):.6g} deg; "
                 f"{'correct the intervals' if intervals else 'give the throws'}"
             )
+    for pin in range(len(layout.throw_positions)):
+        if pin not in inputs:
+            rule = f"fixes no angle of throw {pin + 1}, none of whose cylinders fires; give the throws"
+            raise ModelError(f"firing order {list(firing_order)} {rule}")
     return tuple(angle_of(inputs[pin][0]) for pin in range(len(layout.throw_positions)))
 
 
@@ -182,7 +193,7 @@ def throw_rotors(throws: Sequence[Throw]) -> tuple[Rotor, ...]:
 def build(
     cycle: Cycle,
     layout: Layout,
-    mechanism: Mechanism,
+    mechanism: Mechanism | Sequence[Mechanism],
     angles: Sequence[float],
     firing_order: Sequence[int] | None = None,
     intervals: Sequence[float] = (),
@@ -190,7 +201,8 @@ def build(
     """Return the slider-cranks, and the throws that they work on, at these angles when phi = 0 [rad] (C3).
 
     Without firing intervals [rad] each cylinder fires at its first dead centre after the one before. Without a firing
-    order every cylinder is taken to fire at its first dead centre, which matters to gas loads alone.
+    order every cylinder is taken to fire at its first dead centre, which matters to gas loads alone. The mechanism is
+    that of all cylinders, or one for each.
     """
     if len(angles) != len(layout.throw_positions):
         raise ModelError(f"{counted(len(angles), 'throw')} given, but the layout has {len(layout.throw_positions)}")
@@ -200,8 +212,9 @@ def build(
         if firing_order
         else tuple(angle_of(reduced_turn(layout.dead_centre(angles, k), 1)) for k in cylinders)
     )
+    mechanisms = [mechanism] * len(cylinders) if isinstance(mechanism, Mechanism) else mechanism
     slider_cranks = tuple(
-        mechanism.cylinder(
+        mechanisms[k].cylinder(
             k + 1,
             layout.positions[k],
             angles[layout.pins[k]] + layout.pin_offsets[k],
@@ -215,14 +228,17 @@ def build(
             as_kind(OffsetCrank, replace(part, offset=offset))
             for part, offset in zip(slider_cranks, layout.offsets, strict=True)
         )
-    unbalance = mechanism.rotating_mass * mechanism.crank_radius
-    throws = tuple(
-        Throw(
-            x,
-            angles[pin],
-            tuple(k for k, own_pin in enumerate(layout.pins) if own_pin == pin),
-            unbalance * cis(as_turn(angles[pin])),
-        )
-        for pin, x in enumerate(layout.throw_positions)
-    )
-    return slider_cranks, throws
+    throws = []
+    for pin, x in enumerate(layout.throw_positions):
+        on_throw = tuple(k for k, own_pin in enumerate(layout.pins) if own_pin == pin)
+        unbalance = throw_unbalance([mechanisms[k] for k in on_throw])
+        throws.append(Throw(x, angles[pin], on_throw, unbalance * cis(as_turn(angles[pin]))))
+    return slider_cranks, tuple(throws)
+
+
+def throw_unbalance(mechanisms: Sequence[Mechanism]) -> float:
+    """Return the unbalance of a throw without rods, from the mechanisms of the cylinders on it [kg m]."""
+    first, count = mechanisms[0], len(mechanisms)
+    if all(mechanism.pin_mass is None for mechanism in mechanisms):
+        return first.rotating_mass * first.crank_radius
+    return sum(mechanism.mass_at_pin(count) for mechanism in mechanisms) * first.crank_radius

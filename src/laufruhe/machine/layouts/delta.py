@@ -10,8 +10,8 @@ from fractions import Fraction
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.banks import in_banks
-from laufruhe.machine.layouts.base import CRANK_DISTANCE, SPACING, LayoutInput, LayoutKey, LayoutKind
-from laufruhe.machine.layouts.build import Throw
+from laufruhe.machine.layouts.base import CRANK_DISTANCE, OF_CYLINDER, SPACING, LayoutInput, LayoutKey, LayoutKind
+from laufruhe.machine.layouts.build import Throw, throw_unbalance
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
@@ -89,6 +89,7 @@ class Delta(LayoutKind):
     cylinders_per_throw = 3
     banks = 3
     fires_evenly = True
+    single = OF_CYLINDER
 
     def place(self, inputs: LayoutInput) -> Layout:
         """Return the layout: throws of the lower crank, and banks at the dead centres of their first pistons."""
@@ -120,7 +121,8 @@ class Delta(LayoutKind):
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the pistons of a delta engine, those at first corners of banks first, and the throws of all cranks."""
-        triangle, mechanism, order = self._triangle(inputs), inputs.mechanism, inputs.firing_order
+        triangle, order = self._triangle(inputs), inputs.firing_order
+        mechanisms = [inputs.of(k).mechanism for k in range(inputs.cylinders)] * 2
         pistons: list[SliderCrank] = []
         cranks: list[Throw] = []
         for turned in (0, 1):
@@ -131,12 +133,12 @@ class Delta(LayoutKind):
                     centre = reduced_turn(triangle.centre(corner, bank) - as_turn(throw), 1)
                     angle = reduced_turn(axis - triangle.ratios[corner] * centre, 1)
                     angles = (angle_of(angle), angle_of(reduced_turn(axis, 1)), angle_of(centre))
-                    pistons.append(mechanism.cylinder(len(pistons) + 1, x, *angles, shaft=shaft))
+                    pistons.append(mechanisms[len(pistons)].cylinder(len(pistons) + 1, x, *angles, shaft=shaft))
         for shaft in triangle.shafts:
             for x in layout.throw_positions:
                 piston_numbers = tuple(k for k, part in enumerate(pistons) if part.shaft == shaft and part.x == x)
                 angle = pistons[piston_numbers[0]].throw
-                unbalance = mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angle))
+                unbalance = throw_unbalance([mechanisms[k] for k in piston_numbers]) * cis(as_turn(angle))
                 cranks.append(Throw(x, angle, piston_numbers, unbalance, shaft))
         if order is not None:
             fires = [as_turn(part.firing_angle) for part in pistons[: inputs.cylinders]]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.layouts.banks import Inline
-from laufruhe.machine.layouts.base import CRANK_DISTANCE, LayoutInput, LayoutKey
+from laufruhe.machine.layouts.base import CRANK_DISTANCE, OF_CYLINDER, LayoutInput, LayoutKey
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import Shaft
@@ -65,6 +65,7 @@ class OpposedPiston(Inline):
         LayoutKey("port_arc", "angle", "Crank angle for which the ports of a piston are open; a lead has to be less."),
     )
     openable = ()
+    single = (*OF_CYLINDER, "second_reciprocating_mass")
 
     def parts(
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
@@ -76,10 +77,14 @@ class OpposedPiston(Inline):
             rule = f"is beyond the ports, which are open for {units.quantity_text(ports, 'rad')} and never together"
             raise KeyedError("crank_lead", f"{rule}; lessen it", units.quantity_text(lead, "rad"))
         crank = Shaft("second crankshaft", float(inputs.options["crank_ratio"] or -1), 0.0, inputs.crank_distance)
-        upper = facing_pistons(lower, crank, lead, inputs.mechanism.rotating_mass)
-        second_mass = inputs.options["second_reciprocating_mass"]
-        if second_mass is not None:
-            heavier = second_mass - inputs.piston_mass
-            upper = tuple(replace(part, reciprocating_mass=part.reciprocating_mass + heavier) for part in upper)
+        upper = list[SliderCrank]()
+        for k, part in enumerate(lower):
+            of_cylinder = inputs.of(k)
+            (second,) = facing_pistons([part], crank, lead, of_cylinder.mechanism.mass_at_pin(1))
+            second_mass = of_cylinder.options["second_reciprocating_mass"]
+            if second_mass is not None:
+                heavier = second_mass - of_cylinder.piston_mass
+                second = replace(second, reciprocating_mass=second.reciprocating_mass + heavier)
+            upper.append(second)
         above = tuple(Throw(p.x, p.throw, (len(lower) + k,), shaft=crank) for k, p in enumerate(upper))
         return (*lower, *upper), (*cranks, *above)

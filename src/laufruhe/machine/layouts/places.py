@@ -45,18 +45,25 @@ class Layout:
     throws: tuple[float, ...] | None = None
 
     def dead_centre_turn(self, k: int) -> Turn:
-        """Return the crank angle at which cylinder k has alpha = 0 if its throw is at zero, in turns (C5)."""
-        return as_turn(self.banks[k]) - as_turn(self.pin_offsets[k])
+        """Return the crank angle of cylinder k's dead centre if its throw is at zero, in turns (C5)."""
+        delay = as_turn(self.firing_delays[k]) if self.firing_delays else 0
+        return as_turn(self.banks[k]) - as_turn(self.pin_offsets[k]) + delay
 
     def dead_centre(self, throws: Sequence[float], k: int) -> Turn:
         """Return the crank angle of cylinder k's dead centre, in turns (C5)."""
-        delay = as_turn(self.firing_delays[k]) if self.firing_delays else 0
-        return self.dead_centre_turn(k) - as_turn(throws[self.pins[k]]) + delay
+        return self.dead_centre_turn(k) - as_turn(throws[self.pins[k]])
 
     @property
     def spread(self) -> float:
         """Largest deviation from even firing, because the dead centres of some cylinders come later [rad]."""
         return max(self.firing_delays) - min(self.firing_delays) if self.firing_delays else 0.0
+
+    def throw_centre_turn(self, throw: int) -> Turn:
+        """Return the dead centre of a throw's first cylinder if the throw is at zero, in turns (S6).
+
+        It is equal for all throws unless cylinders stand in rows, or differ in their offset.
+        """
+        return self.dead_centre_turn(self.on_throw(throw)[0])
 
     def on_throw(self, throw: int) -> list[int]:
         """Return the cylinders of a throw; those that lean alike come in one order on all throws."""
@@ -85,6 +92,11 @@ class Layout:
         return self.sides[k] if self.sides else 0.0
 
 
-def stations(count: int, spacing: float) -> tuple[float, ...]:
-    """Return `count` positions along x at equal spacing [m], the first at the front, the middle at x = 0 (C2)."""
+def stations(count: int, spacing: float | Sequence[float]) -> tuple[float, ...]:
+    """Return `count` positions along x [m], the first at the front, the middle at x = 0 (C2).
+
+    `spacing` is their common distance, or the distance of each to the next [m].
+    """
+    if isinstance(spacing, Sequence):
+        return tuple(0.5 * (sum(spacing[k:]) - sum(spacing[:k])) for k in range(count))
     return tuple((count - 1 - 2 * k) * (0.5 * spacing) for k in range(count))

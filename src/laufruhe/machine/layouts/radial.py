@@ -41,6 +41,7 @@ class Radial(LayoutKind):
     )
     lists = ("firing_order", "firing_intervals")
     openable = ("firing_order",)
+    single = ("bore", "reciprocating_mass", "knuckle_mass", "articulated_rod")
     needs_rod = True
 
     def place(self, inputs: LayoutInput) -> Layout:
@@ -53,7 +54,7 @@ class Radial(LayoutKind):
         banks, places = tuple(math.tau * k / count for k in range(count)), inputs.places
         try:
             # master rod and knuckle pins go by number
-            on_crank = [inputs.mechanism.cylinder(k + 1, 0.0, 0.0, banks[at], 0.0) for k, at in enumerate(places)]
+            on_crank = [inputs.of(k).mechanism.cylinder(k + 1, 0.0, 0.0, banks[at], 0.0) for k, at in enumerate(places)]
             by_number = _hinged(inputs, on_crank)
         except KeyedError:
             raise
@@ -73,7 +74,8 @@ class Radial(LayoutKind):
             1 + places.index((places[0] + k) % count) for start in range(turns) for k in range(start, count, turns)
         ]
         order = list(inputs.firing_order or order)
-        on_crank, cranks = build(inputs.cycle, layout, inputs.mechanism, throws, order, inputs.firing_intervals)
+        mechanisms = [inputs.of(k).mechanism for k in range(count)]
+        on_crank, cranks = build(inputs.cycle, layout, mechanisms, throws, order, inputs.firing_intervals)
         return _hinged(inputs, on_crank), cranks
 
 
@@ -111,13 +113,14 @@ def _hinged(inputs: LayoutInput, on_crank: Sequence[SliderCrank]) -> tuple[Slide
         angle = part.bank - master_bank if angles is None else angles[k - (k > index)]
         knuckle = Knuckle(master, options["knuckle_radius"], angle)
         length = options["articulated_rod_length"] or knuckle.length_to(top, part.bank)
-        articulated = replace(part, rod_length=length, rotating_mass=options["knuckle_mass"])
-        if options["articulated_rod"] is not None:
-            rod = rod_of("articulated_rod", options["articulated_rod"], length, "knuckle pin")
+        of_cylinder = inputs.of(k).options
+        articulated = replace(part, rod_length=length, rotating_mass=of_cylinder["knuckle_mass"])
+        if of_cylinder["articulated_rod"] is not None:
+            rod = rod_of("articulated_rod", of_cylinder["articulated_rod"], length, "knuckle pin")
             articulated = replace(
                 articulated,
-                reciprocating_mass=inputs.piston_mass + rod.reciprocating_mass,
-                rotating_mass=options["knuckle_mass"] + rod.rotating_mass,
+                reciprocating_mass=inputs.of(k).piston_mass + rod.reciprocating_mass,
+                rotating_mass=of_cylinder["knuckle_mass"] + rod.rotating_mass,
                 rod_inertia_deficit=rod.inertia_deficit,
             )
         parts[k] = as_kind(ArticulatedCrank, articulated, knuckle=knuckle) if knuckle.radius else articulated

@@ -13,7 +13,6 @@ from fractions import Fraction
 from functools import reduce
 from operator import add
 
-from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import as_order
 from laufruhe.problem.evaluation import Evaluation, with_common_base
@@ -36,7 +35,7 @@ def firing_bound(problem: Problem, design: Evaluation) -> float:
     ):
         return 0.0
     # shafts that are not built in this design may be built in others
-    if not _is_alike(engine) or not _is_alike(problem.engine) or gas_distinguishes_cylinders(problem):
+    if not _is_alike(engine) or not _is_alike(problem.engine) or problem.gas_distinguishes_cylinders:
         return 0.0
     total = 0.0
     for term in problem.objective:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,7 +10,7 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.firing_model import FiringModel, slot_space
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.machine.firing import even_patterns, firing_lattice, order_slots
+from laufruhe.machine.firing import even_patterns, firing_lattice, order_slots, star_steps
 from laufruhe.machine.layouts import Layout, even_throws
 from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.problem.phasing import Candidate
@@ -82,8 +81,7 @@ def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family
         try:
             patterns = even_patterns(phasing.cycle, layout)
             if order is not None:
-                throws = even_throws(phasing.cycle, layout, order)
-                fixed = tuple(round((angle - throws[0]) / math.tau * lattice.steps) % lattice.steps for angle in throws)
+                fixed = star_steps(layout, even_throws(phasing.cycle, layout, order), lattice.steps)
         except ModelError as error:
             reason = str(error)
             continue

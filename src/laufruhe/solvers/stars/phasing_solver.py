@@ -12,7 +12,6 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.errors import ModelError, SolverError, counted
-from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
 from laufruhe.machine.firing import MAX_ORDERS
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import report_progress
@@ -49,7 +48,7 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
     if phasing is None:
         raise SolverError("the problem has no open phasing")
     has_wheel = bool(flywheel_measures(problem))
-    if phasing.throws is None and has_wheel and not phasing.continuous and not gas_distinguishes_cylinders(problem):
+    if phasing.throws is None and has_wheel and not phasing.continuous and problem.cylinders_are_alike:
         return solve_alike_stars(problem, phasing, partial(solve_phasing, search=search))
     started = time.perf_counter()
     if phasing.throws is not None:
@@ -63,16 +62,15 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
 
 def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
-    cylinders_differ = gas_distinguishes_cylinders(problem)
-    if flywheel_measures(problem) and not cylinders_differ:
+    has_wheel = bool(flywheel_measures(problem))
+    if has_wheel and problem.cylinders_are_alike:
         even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
         solve = partial(solve_phasing, search=search)
         result = solve_alike_stars(problem, even, solve) if is_even and families_of(even)[0] else None
         return _solve_uneven(problem, phasing, None if result is None or result.objective is None else result)
-    solves_each = (
-        cylinders_differ or phasing.shares_throws or any(measure.is_cylinder_resolved for measure in problem.measures)
-    )
-    if (problem.depends_on_firing_order or cylinders_differ) and is_even and solves_each:
+    is_resolved = any(measure.is_cylinder_resolved for measure in problem.measures)
+    solves_each = problem.depends_on_firing_order and (phasing.shares_throws or is_resolved)
+    if is_even and (has_wheel or solves_each):
         stars = even_stars(phasing)
         result = solve_every_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
         if not phasing.continuous:
