@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from laufruhe import plots as plots
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.number_types import open_number as open
+    from laufruhe.problem.own_measures import own_measure
     from laufruhe.problem.problem import Problem
     from laufruhe.python import tables as tables
     from laufruhe.python.draft import EngineDraft
@@ -48,6 +49,7 @@ _LAYOUTS = ("boxer", "delta", "engine", "inline", "opposed_piston", "parts", "ra
 # imported at first use, so that import laufruhe is quick
 _ELSEWHERE = {
     "EngineDraft": "laufruhe.python.draft",
+    "own_measure": "laufruhe.problem.own_measures",
     "Problem": "laufruhe.problem.problem",
     "Result": "laufruhe.python.results",
     **dict.fromkeys(("Progress", "ProgressLine"), "laufruhe.python.watch"),
@@ -71,6 +73,7 @@ __all__ = [
     "SolverError",
     "__version__",
     "boxer",
+    "certify",
     "delta",
     "engine",
     "engines",
@@ -82,6 +85,7 @@ __all__ = [
     "machine",
     "open",
     "opposed_piston",
+    "own_measure",
     "parts",
     "plots",
     "radial",
@@ -150,7 +154,10 @@ def load(source: Source) -> Problem:
 
 
 @_on_one_thread
-def solve(problem: Problem | Source, time_limit: float | None = None, callback: Callback | None = None) -> Result:
+def solve(
+    problem: Problem | Source, time_limit: float | None = None, callback: Callback | None = None,
+    solver: str | None = None,
+) -> Result:  # fmt: skip
     """Solve a problem; the result includes its proof.
 
     Parameters
@@ -162,6 +169,9 @@ def solve(problem: Problem | Source, time_limit: float | None = None, callback: 
     callback
         Function of the `Progress` of the search; if it returns True, the search ends with its best design and bound.
         `ProgressLine()` shows the progress.
+    solver
+        Solver of cvxpy that proposes unbalances, such as "SCS", in place of those of this package. The proof is the
+        same.
 
     Raises
     ------
@@ -181,6 +191,10 @@ def solve(problem: Problem | Source, time_limit: float | None = None, callback: 
     if time_limit is not None and not (isinstance(time_limit, Real) and time_limit > 0.0):
         raise wrong_call("time_limit", time_limit, "must be a number of seconds above zero", "try 60")
     checked = replace(_problem(problem), sharply=True)
+    if solver is not None:
+        from laufruhe.solvers.methods import by_solver
+
+        checked = by_solver(checked, solver)
     return watched(checked, callback, lambda watch: decide(checked, watch, time_limit, diagnose=True))
 
 
@@ -219,6 +233,40 @@ def evaluate(
     return python_result(evaluate_only(problem if values is None else problem.with_values(values)))
 
 
+@_on_one_thread
+def certify(
+    problem: Problem | Source, values: Mapping[str, Any], multipliers: Mapping[str, ArrayLike] | None = None
+) -> Result:
+    """Prove how good a design is that someone else found.
+
+    Parameters
+    ----------
+    problem
+        Problem, or an argument of `load`.
+    values
+        Values of open numbers by their names in results, as `evaluate_many` takes them for one design.
+    multipliers
+        Multipliers of terms and limits by name: dual rows as `to_cvxpy().multipliers` has them, or one number, the
+        price of a limit. Any multipliers give a valid bound. By default a solve finds the bound.
+
+    Returns
+    -------
+    Result with the exact value, lower bound and gap of this design, and the kind of its proof. A proof is "global" or
+    "global within gap"; it is "none" if the bound is not known to reach the optimum.
+
+    Raises
+    ------
+    InputError
+        If a value is outside of its bounds, or the design violates a limit.
+    ModelError
+        If the engine cannot be evaluated, or multipliers are given for other open numbers than unbalances.
+    """
+    from laufruhe.python.results import python_result
+    from laufruhe.solvers.certify import certify as prove
+
+    return python_result(prove(_problem(problem), values, multipliers))
+
+
 def _engine_problem(design: Engine, points: Sequence[OperatingPoint]) -> Problem:
     """Return a problem of the mount forces of an engine, or of its shaking force without mounts."""
     from laufruhe.machine import OperatingPoint
@@ -239,9 +287,9 @@ def _engine_problem(design: Engine, points: Sequence[OperatingPoint]) -> Problem
 @_on_one_thread
 def evaluate_many(
     problem: Problem | Source,
-    designs: Mapping[str, ArrayLike] | Sequence[Mapping[str, str | float]] | pd.DataFrame,
+    designs: Mapping[str, ArrayLike] | Sequence[Mapping[str, str | float]] | pd.DataFrame | xr.Dataset,
     jobs: int = 1,
-) -> pd.DataFrame:
+) -> Any:
     """Evaluate many designs of one problem, and return a table with a row for each.
 
     Designs that differ in unbalances share one model, and take some 10 to 30 microseconds each. Others are evaluated
@@ -252,16 +300,18 @@ def evaluate_many(
     problem
         Problem, or an argument of `load`.
     designs
-        Values of open numbers by their names in results: arrays by name, a mapping for each design, or a table. Numbers
-        are in SI units, angles in radians; texts have a unit. A number that is missing has its start value.
+        Values of open numbers by their names in results: arrays by name, a mapping for each design, a table, or an
+        xarray dataset, whose variables are broadcast. Numbers are in SI units, angles in radians; texts have a unit. A
+        number that is missing has its start value.
     jobs
-        Largest number of processes for designs that are evaluated one by one.
+        Largest number of processes for designs that are evaluated one by one, and of threads for the others.
 
     Returns
     -------
     Columns: the given numbers, `objective`, each term by the name of its measure, each limit by its name (all in SI
     units, which `attrs["units"]` names), `feasible` (limits and bounds are kept), and `message`, empty or the reason
-    why a design cannot be evaluated.
+    why a design cannot be evaluated. The table is a pandas DataFrame, or a dataset with the dimensions of the designs
+    if these are one.
 
     Raises
     ------

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
@@ -14,7 +15,7 @@ from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS
 
 MIXED = ("single-stroke-offset", "worked-diesel-counterweight", "tractor-four-elastic", "two-machines-angle")
-SHARED = ("tractor-four-lanchester", "geared-inertia", "tractor-three-bearings", "shaper")
+SHARED = ("car-four-willans", "tractor-four-lanchester", "geared-inertia", "tractor-three-bearings", "shaper")
 COUNT = 9
 
 
@@ -64,6 +65,18 @@ def test_designs_of_every_form_are_equal() -> None:
     assert list(named.index) == ["a", "b", "c"]
     assert table.equals(named.reset_index(drop=True))
     assert list(table["front web.mass"]) == [1.0, 1.2, 2.0]
+
+
+def test_a_dataset_returns_its_dimensions() -> None:
+    problem = ready("tractor-four-lanchester")
+    sizes = xr.Dataset({"left.unbalance": ("left", [0.0, 0.01]), "right.unbalance": ("right", [0.0, 0.01, 0.02])})
+    data = laufruhe.evaluate_many(problem, sizes.assign_coords(left=["small", "large"]), jobs=2)
+    assert data.objective.dims == ("left", "right")
+    assert data.objective.units == "N"
+    table = laufruhe.evaluate_many(problem, {"left.unbalance": [0.01], "right.unbalance": [0.02]})
+    assert float(data.objective.sel(left="large").isel(right=2)) == pytest.approx(table.objective[0], rel=1e-12)
+    with pytest.raises(InputError, match="has no dimension"):
+        laufruhe.evaluate_many(problem, xr.Dataset({"left.unbalance": 0.01}))
 
 
 def test_missing_numbers_have_their_start() -> None:

@@ -162,6 +162,7 @@ def solve(
     animate: o.AnimateOption = False,
     tolerance: o.ToleranceOption = None,
     time_limit: o.LimitOption = None,
+    solver: o.SolverOption = None,
     scheduler: o.SchedulerOption = None,
     series: o.SeriesOption = False,
     quiet: o.QuietOption = False,
@@ -175,7 +176,7 @@ def solve(
     with exit_statuses(problem), spoken(quiet, verbose), resources(time_limit, scheduler), artist(kinds) as ask:
         from laufruhe.cli.solve import run, solve
 
-        run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series), solve)
+        run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series, solver), solve)
 
 
 @app.command(epilog=o.examples("laufruhe evaluate problem.toml --series --json -"))

@@ -68,6 +68,8 @@ ERROR = "Relative error of the objective that is allowed."
 FidelityTolerance = Annotated[float, typer.Option("--tolerance", metavar="X", help=ERROR)]
 LIMIT = "End the search after SECONDS with the best design so far and its bound."
 LimitOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=LIMIT)]
+SOLVER = "Let a solver of cvxpy propose unbalances, such as SCS; the proof stays that of Laufruhe."
+SolverOption = Annotated[str | None, typer.Option("--solver", metavar="NAME", help=SOLVER)]
 STOP = "End after SECONDS; finished work is kept."
 StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=STOP)]
 JOBS = "Use at most N processes.  [default: one for each core]"

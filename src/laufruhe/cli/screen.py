@@ -50,12 +50,14 @@ class Request:
     animated: bool = False
     tolerance: float | None = None
     series: bool = False
+    solver: str | None = None
 
     @property
     def command(self) -> str:
         """Command line that makes the same result again."""
         words = ["laufruhe", self.verb, str(self.problem), *(("--series",) if self.series else ())]
-        return typed(*words, *([] if self.tolerance is None else ["--tolerance", f"{self.tolerance:g}"]))
+        words += [] if self.tolerance is None else ["--tolerance", f"{self.tolerance:g}"]
+        return typed(*words, *([] if self.solver is None else ["--solver", self.solver]))
 
 
 @contextmanager

@@ -34,6 +34,10 @@ def run(request: Request, answer: Answer) -> None:
             problem = load(request.problem)
             if request.tolerance is not None:
                 problem = replace(problem, tolerance=share_below_one("--tolerance", request.tolerance))
+            if request.solver is not None:
+                from laufruhe.solvers.methods import by_solver
+
+                problem = by_solver(problem, request.solver)
         warn(problem, request.problem)
         # a file called '...toml' would name the folder above
         name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]

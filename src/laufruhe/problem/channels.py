@@ -148,6 +148,8 @@ class Channel:
         shafts move between their places in the two engines.
     is_placing
         True for distances of shafts.
+    linear_in
+        Load of which it is a linear function at each crank angle, so that it depends on decisions as that load does.
     """
 
     name: str
@@ -169,6 +171,7 @@ class Channel:
     place: str = ""
     span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_placing: bool = False
+    linear_in: Channel | None = None
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
     is_number: ClassVar[bool] = False

@@ -302,6 +302,11 @@ class Decision:
     drives: tuple[Drive, ...]
 
     @property
+    def angle_name(self) -> str:
+        """Name of the angle that belongs to its size."""
+        return self.name.rsplit(".", 1)[0] + ".angle"
+
+    @property
     def lower(self) -> float:
         """Lower bound of the number along its direction; zero if its angle is open."""
         return self.set.lower

@@ -136,6 +136,7 @@ _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
 def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     """Return how a channel follows decisions of one kind, such as affine or smooth, in this problem."""
+    channel = channel.linear_in or channel
     if CHANNELS.get(channel.name) is not channel:
         return Dependence.UNKNOWN
     entry = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)

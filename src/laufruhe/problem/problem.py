@@ -25,6 +25,7 @@ from laufruhe.problem.measure import Limit, Measure, PriorityLevel, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.plausibility import plausibility_warnings
 from laufruhe.problem.sets import Value
+from laufruhe.problem.statements import Statements
 from laufruhe.units import quantity
 
 if TYPE_CHECKING:
@@ -105,12 +106,17 @@ class Search:
         Largest number of start points, and seed of random ones.
     boxes
         Largest number of boxes in branch and bound; None lets the method choose.
+    proves
+        False if no lower bound is needed.
+    solver
+        Solver of cvxpy that proposes unbalances; empty for the solvers of this package.
     """
 
     starts: int = 16
     seed: int = 0
     boxes: int | None = None
     proves: bool = True
+    solver: str = ""
 
     def boxes_or(self, usual: int) -> int:
         """Return the requested number of boxes, or the usual one."""
@@ -155,7 +161,7 @@ class KnownRows:
 
 
 @dataclass(frozen=True, repr=False)
-class Problem(Goals):
+class Problem(Goals, Statements):
     """A design problem as solvers and reports need it.
 
     Attributes

@@ -224,9 +224,13 @@ def is_sampled(measure: Measure) -> bool:
 
 def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: dict[str, float]) -> Result:
     """Return the result with the better of a design and the initial design; `timing` has seconds by stage."""
-    problem = design.problem
-    baseline = Design.of(problem, problem.start, initial)
-    design = min(design, baseline, key=lambda candidate: candidate.rank)
+    baseline = Design.of(design.problem, design.problem.start, initial)
+    return result_of(min(design, baseline, key=lambda candidate: candidate.rank), baseline, proof, timing)
+
+
+def result_of(design: Design, baseline: Design, proof: ProofData, timing: dict[str, float]) -> Result:
+    """Return the result with a design, and with the initial design as `baseline`."""
+    problem, initial = design.problem, baseline.evaluation
     is_feasible = design.violation <= FEASIBILITY_TOL
     zero_level = numerical_zero(problem, design.evaluation.engine)
     message = f"the initial design has no finite loads: {initial.resonance}" if initial.resonance else ""

@@ -67,6 +67,8 @@ def solve_by_local_programs(
         best = _alternate_with_cones(program, best, decide)
     design = evaluate_design(problem, program.values(best))
     text = f"local programs from the best of {counted(len(points), 'start')}"
+    claims = dict.fromkeys(measure.norm.claim for measure in problem.measures if measure.is_load)
+    text = "; ".join(filter(None, [text, *claims]))
     proof = proof_data(program, design, 0.0, ProofStrength.RELAXED, text)
     # gas pressure and speeds may depend on open numbers
     solved = replace(problem, points=tuple(loads.point for loads in design.evaluation.loads))

@@ -7,6 +7,7 @@ one, by several processes if wanted.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import partial
@@ -30,6 +31,7 @@ from laufruhe.solvers.prices import angle_name
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 _FEWEST, _PIECE = 8, 50
 """Fewest designs for which one affine model pays, and number of designs in one piece of work of a process."""
@@ -37,16 +39,31 @@ _INSIDE = 1e-9
 _Answer: TypeAlias = tuple[list[float] | float, str]
 
 
-def evaluate_many(problem: Problem, designs: Any, jobs: int = 1) -> pd.DataFrame:
+def evaluate_many(problem: Problem, designs: Any, jobs: int = 1) -> pd.DataFrame | xr.Dataset:
     """Return objective, terms and limits of designs [SI], a row for each (`laufruhe.evaluate_many`)."""
+    # a dataset exists only where xarray is imported
+    if "xarray" not in sys.modules or not isinstance(designs, sys.modules["xarray"].Dataset):
+        return _table(problem, designs, jobs)
+    if not designs.sizes:
+        raise wrong_call(
+            "designs", dict(designs), "has no dimension", "give each number along a dimension, such as design"
+        )
+    table = _table(problem, designs.to_dataframe()[list(designs.data_vars)], jobs)
+    data = table.to_xarray().transpose(*designs.sizes).assign_coords(designs.coords)
+    for name, unit in table.attrs["units"].items():
+        data[name].attrs["units"] = unit or "1"
+    return data
+
+
+def _table(problem: Problem, designs: Any, jobs: int) -> pd.DataFrame:
     import pandas as pd
 
     problem = problem.drawing
     if problem.phasing is not None:
         names = ", ".join(problem.phasing.open_names)
         raise ModelError(f"designs that are evaluated together have one crank and one firing order; fix {names}")
-    columns, index = _columns(problem, designs)
-    values, inside = _values(problem.decisions, columns, len(index))
+    columns, index = columns_of(problem, designs)
+    values, inside = values_of_columns(problem.decisions, columns, len(index))
     numbers, messages = _measured(problem, values, jobs)
     named = [(term.measure.name, term.measure) for term in problem.objective]
     named += [(limit.name, limit.measure) for limit in problem.limits]
@@ -60,7 +77,7 @@ def evaluate_many(problem: Problem, designs: Any, jobs: int = 1) -> pd.DataFrame
         measures[heading], table[heading], attributes[heading] = measure, column, measure.unit
     is_evaluated = np.array([not message for message in messages], dtype=bool)
     frame = pd.DataFrame(table, index=index)
-    frame["feasible"] = inside & is_evaluated & np.all(slack >= -FEASIBILITY_TOL, axis=1)
+    frame["feasible"] = np.all(inside, axis=1) & is_evaluated & np.all(slack >= -FEASIBILITY_TOL, axis=1)
     frame["message"] = messages
     frame.attrs["units"] = attributes
     return frame
@@ -76,7 +93,7 @@ def _units(problem: Problem) -> dict[str, str]:
     return named
 
 
-def _columns(problem: Problem, designs: Any) -> tuple[dict[str, Array], Any]:
+def columns_of(problem: Problem, designs: Any) -> tuple[dict[str, Array], Any]:
     """Return the numbers of designs by name [SI], and the index of their table."""
     import pandas as pd
 
@@ -114,12 +131,14 @@ def _numbers(name: str, column: Sequence[Any], unit: str) -> Array:
     return numbers
 
 
-def _values(decisions: Sequence[Decision], columns: Mapping[str, Array], count: int) -> tuple[ComplexArray, Mask]:
-    """Return the values of decisions, shape (designs, decisions), and the mask of designs within their bounds.
+def values_of_columns(
+    decisions: Sequence[Decision], columns: Mapping[str, Array], count: int
+) -> tuple[ComplexArray, Mask]:
+    """Return the values of decisions, shape (designs, decisions), and the mask of those within their bounds.
 
     A number that is missing has its start value; NaN in `columns` is replaced by it.
     """
-    values, inside = np.empty((count, len(decisions)), dtype=complex), np.ones(count, dtype=bool)
+    values, inside = np.empty((count, len(decisions)), dtype=complex), np.ones((count, len(decisions)), dtype=bool)
     for k, decision in enumerate(decisions):
         size, angle = (np.full(count, start) for start in decision.set.split(decision.start))
         for part, name in ((size, decision.name), (angle, angle_name(decision))):
@@ -128,10 +147,10 @@ def _values(decisions: Sequence[Decision], columns: Mapping[str, Array], count: 
                 columns[name][missing] = part[missing]
                 part[:] = columns[name]
         edge = _INSIDE * decision.set.scale
-        inside &= (size >= decision.lower - edge) & (size <= decision.upper + edge)
+        inside[:, k] = (size >= decision.lower - edge) & (size <= decision.upper + edge)
         if decision.set.width > 1 and not decision.set.free_angle:
             low, high = decision.set.angles
-            inside &= np.mod(angle - low + _INSIDE, math.tau) <= high - low + 2.0 * _INSIDE
+            inside[:, k] &= np.mod(angle - low + _INSIDE, math.tau) <= high - low + 2.0 * _INSIDE
         values[:, k] = size * np.exp(1j * angle) if decision.set.angles != (0.0, 0.0) else size
     return values, inside
 
@@ -146,7 +165,7 @@ def _measured(problem: Problem, values: ComplexArray, jobs: int) -> tuple[Array,
     others = [k for k, decision in enumerate(problem.decisions) if decision not in shared]
     alone: list[int] = []
     for rows in _equal_rows(values[:, others]) if shared else [np.arange(len(values))]:
-        if not shared or len(rows) < _FEWEST or not _fill(numbers, rows, problem, others, values):
+        if not shared or len(rows) < _FEWEST or not _fill(numbers, rows, problem, others, values, jobs):
             alone += rows.tolist()
     pieces = [alone[k : k + _PIECE] for k in range(0, len(alone), _PIECE)]
     for piece, answers in _answers(problem, values, pieces, jobs):
@@ -191,17 +210,19 @@ def _equal_rows(values: ComplexArray) -> list[Indices]:
     return np.split(order, np.flatnonzero(np.diff(group[order])) + 1)
 
 
-def _fill(numbers: Array, rows: Indices, problem: Problem, others: Sequence[int], values: ComplexArray) -> bool:
+def _fill(
+    numbers: Array, rows: Indices, problem: Problem, others: Sequence[int], values: ComplexArray, threads: int
+) -> bool:
     """Fill in the numbers of designs that differ in shared decisions only, by one model; False if there is none."""
     fixed = [problem.decisions[k] for k in others]
     try:
-        designs = prepare(problem.fixed_at(_numbers_of(fixed, values[rows[0], others]), fixed))
+        designs = prepare(problem.fixed_at(numbers_of(fixed, values[rows[0], others]), fixed))
     except ModelError:
         # evaluations one by one name the reason
         return False
     features = designs.features(np.delete(values[rows], others, axis=1))
-    terms = [designs.values(term.measure, features, tolerance=designs.tolerance) for term in problem.objective]
-    limits = [designs.values(limit.measure, features) for limit in problem.limits]
+    terms = [designs.values(term.measure, features, threads, designs.tolerance) for term in problem.objective]
+    limits = [designs.values(limit.measure, features, threads) for limit in problem.limits]
     slack = [designs.slack(limit, column) for limit, column in zip(problem.limits, limits, strict=True)]
     numbers[rows] = np.stack([*terms, *limits, *slack], axis=1)
     return True
@@ -211,7 +232,7 @@ def _one_by_one(problem: Problem, values: ComplexArray) -> list[_Answer]:
     answers: list[_Answer] = []
     for row in values:
         try:
-            evaluation = evaluate(problem.fixed_at(_numbers_of(problem.decisions, row)))
+            evaluation = evaluate(problem.fixed_at(numbers_of(problem.decisions, row)))
             checks = [evaluation.check_limit(limit) for limit in problem.limits]
             terms = [evaluation.value(term.measure) for term in problem.objective]
         except ModelError as error:
@@ -222,8 +243,8 @@ def _one_by_one(problem: Problem, values: ComplexArray) -> list[_Answer]:
     return answers
 
 
-def _numbers_of(decisions: Sequence[Decision], values: ComplexArray) -> list[Value]:
-    # numbers other than unbalances are real
+def numbers_of(decisions: Sequence[Decision], values: ComplexArray) -> list[Value]:
+    """Return the values of decisions from complex numbers, shape (decisions,); only unbalances stay complex."""
     return [
         complex(value) if decision.rotor_drives else float(value.real)
         for decision, value in zip(decisions, values, strict=True)

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-from laufruhe.errors import ModelError, SolverError
+from laufruhe.errors import ModelError, SolverError, wrong_call
 from laufruhe.extension import in_order
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
@@ -339,6 +339,24 @@ def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = Non
         return method.solve(problem)
     other, relaxed = closing
     return solve_by_relaxation(problem, relaxed, other.solve, method.solve)
+
+
+def by_solver(problem: Problem, name: str) -> Problem:
+    """Return the problem with a solver of cvxpy that proposes its unbalances; the proof stays that of this package.
+
+    Raises
+    ------
+    InputError
+        If cvxpy does not find the solver, or other numbers than unbalances are open.
+    """
+    from laufruhe.solvers.cones.cvxpy_program import check_solver
+
+    name, method = check_solver(name), _method(problem)
+    if problem.extras or method.solver is not _SOLVE_CONES:
+        what = " and ".join(extra.words for extra in problem.extras) or f"'{method.name}'"
+        rule = f"decides unbalances alone, and this problem is decided by {what}"
+        raise wrong_call("solver", name, rule, "leave the solver out")
+    return problem.changed(origin=problem.origin, search=replace(problem.search, solver=name))
 
 
 def _refuse_ranks(problem: Problem) -> None:

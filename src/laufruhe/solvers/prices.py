@@ -334,4 +334,4 @@ def _disc_segments(slope: Array) -> list[Array]:
 
 def angle_name(decision: Decision) -> str:
     """Return the name of the angle that belongs to the size of a decision."""
-    return decision.name.rsplit(".", 1)[0] + ".angle"
+    return decision.angle_name

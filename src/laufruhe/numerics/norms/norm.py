@@ -183,6 +183,11 @@ class Norm(ABC):
     is_monotone_in_lengths: ClassVar[bool] = False
     is_pointwise: ClassVar[bool] = False
 
+    @property
+    def claim(self) -> str:
+        """Property that only the author of the norm declares, in words for the certificate; empty without one."""
+        return ""
+
     def __repr__(self) -> str:
         return f"<{self.name}>"
 

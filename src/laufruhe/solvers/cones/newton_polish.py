@@ -14,6 +14,8 @@ from laufruhe.prove.certificate import Bound, flatten_interior, gap_of, lower_bo
 from laufruhe.solvers.cones.newton import FEW_ROWS, NewtonProgram
 from laufruhe.solvers.cones.tie_break import drop_negligible
 
+NEWTON, CONES = "Newton's method", "second-order cones"
+"""Names of methods that propose unbalances."""
 TARGET_GAP = 1e-6
 """Gap below which an optimum is not refined."""
 REFINEMENT = 8
@@ -42,8 +44,10 @@ class Optimum:
         Samples per period of the cone program.
     zero_level
         Objective that counts as zero [SI].
-    by_newton, is_refined
-        True if Newton's method replaces the cone program, and if it follows with more samples.
+    proposer
+        Name of the method that proposed the design.
+    is_refined
+        True if Newton's method follows with more samples.
     """
 
     x: Array
@@ -53,16 +57,14 @@ class Optimum:
     violation: float
     samples: int
     zero_level: float
-    by_newton: bool
+    proposer: str
     is_refined: bool = False
 
     @property
     def method(self) -> str:
         """Method in words for the certificate."""
-        if self.by_newton:
-            return f"Newton's method at {self.samples} angles"
-        refinement = " and Newton's method" if self.is_refined else ""
-        return f"second-order cones at {self.samples} angles{refinement}"
+        refinement = f" and {NEWTON}" if self.is_refined and self.proposer != NEWTON else ""
+        return f"{self.proposer} at {self.samples} angles{refinement}"
 
 
 def polish(model: AffineModel, coarse: Optimum, samples: int) -> Optimum:

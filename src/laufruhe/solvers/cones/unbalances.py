@@ -30,9 +30,10 @@ from laufruhe.solvers.conclusion import (
     smallest_conflicting,
     violated_limits,
 )
+from laufruhe.solvers.cones.cone_program import ConicSolution
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
-from laufruhe.solvers.cones.newton_polish import REFINEMENT, Optimum, polish
+from laufruhe.solvers.cones.newton_polish import CONES, NEWTON, REFINEMENT, Optimum, polish
 from laufruhe.solvers.cones.tie_break import break_ties
 from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
@@ -207,7 +208,7 @@ def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_lev
 
 def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: float, margin: float) -> Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
-    solution = solve_cones(tighten_limits(coarse, margin))
+    solution, proposer = _proposal(tighten_limits(coarse, margin), problem.search.solver)
     if solution.x is None:
         return None
     x = break_ties(problem, fine, solution.x)
@@ -216,7 +217,17 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: flo
     has_peaks = any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
     peak_model = model.at(fine.samples, finer=True) if has_peaks else fine
     gap = gap_of(peak_model.objective(x), bound.value, zero_level)
-    return Optimum(x, bound, fine, gap, peak_model.violation(x), samples, zero_level, solution.by_newton)
+    return Optimum(x, bound, fine, gap, peak_model.violation(x), samples, zero_level, proposer)
+
+
+def _proposal(affine: AffineProblem, solver: str) -> tuple[ConicSolution, str]:
+    # design with dual rows, and the name of its method
+    if solver:
+        from laufruhe.solvers.cones.cvxpy_program import solve_by_cvxpy
+
+        return solve_by_cvxpy(affine, solver), f"{CONES} by {solver}"
+    solution = solve_cones(affine)
+    return solution, NEWTON if solution.by_newton else CONES
 
 
 def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:

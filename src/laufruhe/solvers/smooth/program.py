@@ -23,6 +23,7 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.block_loads import FixedCrankLoads, OpenCrankLoads, SymbolicLoads
+from laufruhe.load_models.labelled_rows import column_names
 from laufruhe.load_models.mount_rows import sampled_rows, transmitted_squares
 from laufruhe.load_models.mount_symbols import PointResponse, elimination, response, symbolic_mounts
 from laufruhe.load_models.simulated import COARSE_STEP
@@ -181,6 +182,17 @@ class SmoothProgram:
         modes, floors = self._modes.symbols.numel(), self._constraints.floors
         low += [*[-math.inf] * modes, *floors]
         return np.array(low), np.array(high + [math.inf] * (modes + len(floors)))
+
+    @property
+    def variable_names(self) -> list[str]:
+        """Name of every variable; "log" stands before a stiffness whose logarithm is the variable."""
+        names = [
+            f"log {d.name}" if log else d.name for d, log in zip(self._decisions, self._is_logarithmic, strict=True)
+        ]
+        names += column_names(self.domains)
+        names += [f"throw {k + 1}" for k in range(self._throw_deviations.numel())]
+        names += [f"mode {k + 1}" for k in range(self._modes.symbols.numel())]
+        return names + [f"head {k + 1}" for k in range(self.program.x.numel() - len(names))]
 
     @property
     def _throw_columns(self) -> slice:

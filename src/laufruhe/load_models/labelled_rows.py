@@ -1,0 +1,174 @@
+"""Load rows V0 and B of every measure as labelled arrays (P1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.decision import Domain
+from laufruhe.problem.dependence import is_affine, open_kinds
+from laufruhe.problem.measure import Measure, counted_rotors, kinks_of
+from laufruhe.problem.problem import Problem
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_PLACES = {"mounts": "mount", "bearings": "bearing", "cylinders": "cylinder", "webs": "web"}
+_DIRECTIONS = {3: ("x", "y", "z"), 2: ("y", "z")}
+
+
+def affine_problem_of(problem: Problem) -> Problem:
+    """Return a problem whose loads are affine in all its open numbers, without objectives of lower priority.
+
+    Raises
+    ------
+    ModelError
+        If other numbers are open, or an extension decides the problem.
+    """
+    others = [decision.name for decision in problem.decisions if not decision.is_affine]
+    others += problem.phasing.open_names if problem.phasing is not None else ()
+    if others:
+        raise ModelError(
+            f"loads are no affine function of {', '.join(others)}; fix {'it' if len(others) == 1 else 'them'}"
+        )
+    kinds = open_kinds(problem)
+    measures = [m for m in problem.measures if m not in problem.known_rows]
+    curved = [measure.name for measure in measures if not is_affine(measure.channel, kinds, problem)]
+    if curved:
+        raise ModelError(f"{curved[0]} is no norm of a load that is affine in the open numbers; remove it")
+    if problem.extras:
+        words = " and ".join(extra.words for extra in problem.extras)
+        raise ModelError(
+            f"the affine model leaves out {words}; remove the table from the problem, or use problem.drawing"
+        )
+    return problem.changed(ranks=()) if problem.ranks else problem
+
+
+def labelled_measures(problem: Problem, angles: int | None = None) -> dict[str, xr.Dataset]:
+    """Return V0 and B of every term and limit by its name (`Problem.affine`)."""
+    model = AffineModel(affine_problem_of(problem), keep_all=True)
+    samples = samples_of(model, angles)
+    terms, limits = part_names(model.problem)
+    return {name: labelled_rows(model, measure, samples) for name, measure in (terms | limits).items()}
+
+
+def samples_of(model: AffineModel, angles: int | None) -> int:
+    """Return the number of samples over one period of the loads, for `angles` over the cycle."""
+    return (
+        model.full_samples
+        if angles is None
+        else math.ceil(angles * float(model.problem.engine.cycle.base_order / model.base))
+    )
+
+
+def part_names(problem: Problem) -> tuple[dict[str, Measure], dict[str, Measure]]:
+    """Return the measures of the terms by name, and those of the limits by the name of the limit.
+
+    A name that is taken has a number after it.
+    """
+    parts = [(term.measure.name, term.measure) for term in problem.objective]
+    parts += [(limit.name, limit.measure) for limit in problem.limits]
+    named: dict[str, Measure] = {}
+    for name, measure in parts:
+        taken = sum(other == name or other.startswith(f"{name} (") for other in named)
+        named[f"{name} ({taken + 1})" if name in named else name] = measure
+    pairs, count = list(named.items()), len(problem.objective)
+    return dict(pairs[:count]), dict(pairs[count:])
+
+
+def column_names(domains: Sequence[Domain]) -> list[str]:
+    """Return a name for each column of the decision vector; an unbalance with an open angle has two (C4)."""
+    parts = {1: ("",), 2: (".real", ".imag")}
+    return [domain.decision.name + part for domain in domains for part in parts[domain.width]]
+
+
+def named_values(domains: Sequence[Domain], x: Array) -> dict[str, float]:
+    """Return sizes and angles of decisions by the names that results use [SI, rad], from a decision vector x.
+
+    Values are moved into their sets.
+    """
+    values = dict[str, float]()
+    for domain in domains:
+        x[domain.columns] = domain.project(x)
+        size, angle = domain.set.split(domain.complex_value(x))
+        values[domain.decision.name] = size
+        if domain.width > 1:
+            values[domain.decision.angle_name] = angle
+    return values
+
+
+def labelled_rows(model: AffineModel, measure: Measure, samples: int) -> xr.Dataset:
+    """Return V0 and B of a measure, with weights of the rows, and labels of points, places, angles and directions.
+
+    `samples` is the number of angles over one period of the loads.
+    """
+    import xarray as xr
+
+    norm = model.norm(measure, samples)
+    axes = row_axes(model, measure, norm, samples)
+    shape, names = tuple(len(labels) for labels in axes.values()), tuple(axes)
+    unit = {"units": measure.unit or "1"}
+    columns = {"decision": column_names(model.domains)}
+    variables = {
+        "constant": (names, norm.constant.reshape(shape), unit),
+        "slope": ((*names, "decision"), norm.slope.reshape(*shape, -1), {"long_name": "derivative of the rows"}),
+        "weight": (names[:-1], norm.grid.weights.reshape(shape[:-1])),
+    }
+    data = xr.Dataset(variables, {**axes, **columns}, {"title": measure.name, "norm": norm.norm.name})
+    if "angle" in data.coords:
+        data["angle"].attrs["units"] = "deg"
+    data["decision"].attrs["units"] = ", ".join(d.decision.unit or "1" for d in model.domains for _ in range(d.width))
+    return data
+
+
+def row_axes(model: AffineModel, measure: Measure, norm: AffineNorm, samples: int) -> dict[str, Any]:
+    """Return the labels of the rows (k, d) of a measure by dimension, in the order of their storage."""
+    (k, d), engine = norm.constant.shape, model.problem.engine
+    if not isinstance(measure.channel, LoadChannel) or measure in model.problem.known_rows:
+        names = [rotor.name for rotor in counted_rotors(measure, engine.rotors)] if measure.is_mass else []
+        return {"part": _labels(names, k), "component": list(range(d))}
+    steps, points = norm.grid.steps, norm.grid.points
+    counted = [
+        p.name for p, share in zip(model.problem.points, measure.shares(model.problem.points), strict=True) if share
+    ]
+    places, part = k // (steps * points), measure.load.part
+    directions = tuple("xyzxyz"[part]) if part is not None else _DIRECTIONS.get(d, tuple(map(str, range(d))))
+    place = _place_axis(measure.load)
+    return {
+        "point": _labels(counted, points),
+        **({place: _labels(_place_names(measure, engine), places)} if place or places > 1 else {}),
+        "angle": _angles(model, measure, samples, steps),
+        "direction": list(directions),
+    }
+
+
+def _place_axis(channel: LoadChannel) -> str:
+    return next((_PLACES[key] for key in channel.keys if key in _PLACES), "")
+
+
+def _place_names(measure: Measure, engine: Engine) -> list[str]:
+    names = list(measure.load.places(engine))
+    return [names[k] for k in measure.places(names)]
+
+
+def _labels(names: Sequence[str], count: int) -> list[Any]:
+    return list(names) if len(names) == count else list(range(count))
+
+
+def _angles(model: AffineModel, measure: Measure, samples: int, steps: int) -> Array:
+    # crank angles of the rows of one signal [deg]; a kink at other angles for each point has NaN
+    regular = 360.0 / float(model.base) * np.arange(samples) / samples
+    if steps == samples:
+        return regular
+    signals = [signal.with_base(model.base) for signal in model.bare.signals(measure.load)]
+    kinks = np.array(kinks_of(measure, signals, model.problem.engine))
+    same = np.ptp(kinks, axis=0) == 0.0
+    return np.append(regular, np.degrees(np.where(same, kinks[0], math.nan)))
