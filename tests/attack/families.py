@@ -337,6 +337,25 @@ def with_gas(rng: Generator) -> Table:
     return table
 
 
+def with_states(rng: Generator) -> Table:
+    """Points at which some cylinders misfire or are cut, beside those at which all fire; the worst mean may count."""
+    table = with_gas(rng)
+    count, objective = len(table["engine"]["throws"]), json.dumps(table["objective"])
+    for point in table["operating_points"]:
+        if point.get("gas", True) and rng.random() < 0.7:
+            numbers = [int(k) + 1 for k in rng.permutation(count)]
+            cut = numbers[: int(rng.integers(0, count + 1))]
+            if "operating_points" not in objective and rng.random() < 0.4:
+                point["misfire"], cut = "each", []
+            elif numbers[len(cut) :]:
+                point["misfire"] = numbers[len(cut) :][: int(rng.integers(1, 3))]
+            if cut:
+                point |= {"cut": cut, "cut_valves": str(rng.choice(["closed", "open"]))}
+    if rng.random() < 0.5:
+        table["objective"] = {"minimise": f"worst mean {rng.choice(['mount force', 'roll moment'])}"}
+    return table
+
+
 def yoke(rng: Generator) -> Table:
     """Rams in line, with levers that weigh something."""
     found = {**mechanism(rng, plain=True), **spaced(rng), "throws": throws(rng, int(rng.integers(1, 4)))}
@@ -916,6 +935,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "parts": of_unbalances(parts),
     "points": of_unbalances(inline, 5),
     "gas": with_gas,
+    "states": with_states,
     "crankcase": crankcase,
     "yokes": of_unbalances(yoke),
     "chambers": with_chambers,

@@ -230,14 +230,34 @@ def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, who
     return pressure(found)
 
 
+def unfired(gas: dict[str, Any], valves: str, m: Mechanism, turns: int) -> np.ndarray:
+    """Absolute pressure of a cylinder without combustion, as `seiliger`: valves that move, stay closed or open."""
+    e, n = (gas.get(k, DEFAULTS[k]) for k in ("compression_ratio", "compression_exponent"))
+    intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
+    s = travel(m, angles(turns, FINE))
+    v = 1.0 / (e - 1.0) + (s.max() - s) / np.ptp(s)
+    if valves == "open":
+        return np.full_like(v, intake)
+    squeezed = intake * (v.max() / v) ** n
+    if valves == "closed" or turns == 1:
+        return squeezed
+    # down from the firing dead centre, up and out, down and in, up
+    k, eighth = np.arange(FINE), FINE // 8
+    lowest, highest = eighth + np.argmin(s[eighth : 3 * eighth]), 3 * eighth + np.argmax(s[3 * eighth : 5 * eighth])
+    return np.select(
+        [(k > lowest) & (k <= highest), (k > highest) & (k <= FINE // 2 + lowest)],
+        [np.full_like(v, exhaust), np.full_like(v, intake)], squeezed,
+    )  # fmt: skip
+
+
 ATMOSPHERE = 101325.0
 FINE = max(16 * 4096, 4 * SAMPLES)
 EXPONENTS = ("compression_exponent", "expansion_exponent")
 DEFAULTS = {"compression_ratio": 17.0, "compression_exponent": 1.35, "expansion_exponent": 1.3}
 
 
-def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
-    """Coefficients of the roll moment of the gas on one piston, its firing at angle 0."""
+def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int, valves: str = "") -> np.ndarray:
+    """Coefficients of the roll moment of the gas on one piston, its firing at angle 0; `valves` if it does not fire."""
     if m.shape is not None:
         from attack.plain_rotary import spectrum
 
@@ -245,7 +265,8 @@ def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
     if m.partner is not None:
         return shared_torque(gas, m, turns)
     area = 0.25 * math.pi * m.bore**2
-    over = seiliger(gas, m, turns) - number(gas.get("crankcase_pressure", ATMOSPHERE))
+    pressure = unfired(gas, valves, m, turns) if valves else seiliger(gas, m, turns)
+    over = pressure - number(gas.get("crankcase_pressure", ATMOSPHERE))
     rise = slope(travel(m, angles(turns, FINE)).astype(complex), turns).real
     return np.fft.rfft(-area * over * rise)[: SAMPLES // 2 + 1] / FINE
 
@@ -590,14 +611,14 @@ def engine_spectrum(found: Machine) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _gas_spectrum(gas: str, m: Mechanism, turns: int) -> np.ndarray:
+def _gas_spectrum(gas: str, m: Mechanism, turns: int, valves: str) -> np.ndarray:
     out = np.zeros((SAMPLES // 2 + 1, 6), complex)
-    out[:, 3] = gas_torque(json.loads(gas), m, turns)
+    out[:, 3] = gas_torque(json.loads(gas), m, turns, valves)
     return out
 
 
-def gas_spectrum(gas: dict[str, Any], found: Machine) -> np.ndarray:
-    """Roll moment of all cylinders, each at its firing angle."""
+def gas_spectrum(gas: dict[str, Any], found: Machine, valves: dict[int, str] | None = None) -> np.ndarray:
+    """Roll moment of all cylinders, each at its firing angle; `valves` of those that do not fire, by their index."""
     orders = np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
     total = np.zeros((SAMPLES // 2 + 1, 6), complex)
     if gas.get("chambers"):
@@ -616,6 +637,6 @@ def gas_spectrum(gas: dict[str, Any], found: Machine) -> np.ndarray:
             told = json.dumps(
                 {**shared, **{key: v for key, v in own.get(k, {}).items() if key != "cylinders"}}, sort_keys=True
             )
-            one = _gas_spectrum(told, upright, found.turns)
+            one = _gas_spectrum(told, upright, found.turns, (valves or {}).get(k, ""))
             total += one * np.exp(-1j * orders * m.fires)
     return total

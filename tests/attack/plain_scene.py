@@ -102,8 +102,27 @@ def _unit_load(engine: str, order: tuple[int, ...] | None) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _gas_load(engine: str, order: tuple[int, ...] | None, gas: str) -> np.ndarray:
-    return plain_loads.gas_spectrum(json.loads(gas), _machine(engine, order))
+def _gas_load(
+    engine: str, order: tuple[int, ...] | None, gas: str, unfired: tuple[tuple[int, str], ...] = ()
+) -> np.ndarray:
+    return plain_loads.gas_spectrum(json.loads(gas), _machine(engine, order), dict(unfired))
+
+
+def states_of(point: Table, cylinders: int) -> list[Table]:
+    """A point, or one for each cylinder that misfires alone."""
+    if point.get("misfire") != "each":
+        return [point]
+    weight = point.get("weight", 1.0) / cylinders
+    return [
+        {**point, "misfire": [k], "weight": weight, "name": f"{point['name']}, cylinder {k} misfires"}
+        for k in range(1, cylinders + 1)
+    ]
+
+
+def unfired_of(point: Table) -> tuple[tuple[int, str], ...]:
+    """Index of each cylinder without combustion, and what its valves do."""
+    misfires = [(k - 1, "moving") for k in point.get("misfire", ())]
+    return (*misfires, *((k - 1, point.get("cut_valves", "closed")) for k in point.get("cut", ())))
 
 
 class Scene:
@@ -129,7 +148,8 @@ class Scene:
 
     @cached_property
     def points(self) -> list[Table]:
-        return list(self.table["operating_points"])
+        cylinders = len(_machine(self._key, self.order).mechanisms)
+        return [state for point in self.table["operating_points"] for state in states_of(point, cylinders)]
 
     @cached_property
     def speeds(self) -> list[float]:
@@ -157,7 +177,8 @@ class Scene:
             for k, point in enumerate(self.points):
                 if point.get("gas", True):
                     told = {**self.table["gas"], **({"imep": point["imep"]} if "imep" in point else {})}
-                    found[k] = found[k] + _gas_load(self._key, self.order, json.dumps(told, sort_keys=True))
+                    gas = json.dumps(told, sort_keys=True)
+                    found[k] = found[k] + _gas_load(self._key, self.order, gas, unfired_of(point))
         return found
 
     @cached_property

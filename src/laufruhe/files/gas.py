@@ -190,7 +190,7 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
                         raise Refused(f"{where}.{key}", None, f"means nothing with model {table.model}", "leave it out")
                 with errors_at_key(where):
                     model = table.makes(**_numbers(table) | numbers)
-                for name in _names(row.cylinders, parts, f"{where}.cylinders"):
+                for name in names_of_cylinders(row.cylinders, parts, f"{where}.cylinders"):
                     if name in single:
                         raise Refused(f"{where}.cylinders", name, "is given twice", "name each cylinder at most once")
                     single[name] = model
@@ -205,8 +205,8 @@ def _numbers(table: SeiligerTable | WiebeTable) -> dict[str, Any]:
     return table.model_dump(exclude={"model", "single_cylinders", "chambers"}, exclude_none=True)
 
 
-def _names(numbers: Sequence[int], parts: Sequence[SliderCrank], where: str) -> list[str]:
-    # two pistons in one cylinder have the same gas
+def names_of_cylinders(numbers: Sequence[int], parts: Sequence[SliderCrank], where: str) -> list[str]:
+    """Return the names of cylinders by their numbers; two pistons in one cylinder are named together."""
     names = []
     for number in numbers:
         if number > len(parts):
@@ -261,7 +261,7 @@ def _traces(
             remedy = f'check columns and firing_order, or write cylinder_angles = "{other}"'
             raise Refused("gas.cylinder_columns", column, rule, remedy)
         first = first or trace
-        traces |= dict.fromkeys(_names([k + 1], parts, "gas.cylinder_columns"), trace)
+        traces |= dict.fromkeys(names_of_cylinders([k + 1], parts, "gas.cylinder_columns"), trace)
     assert first is not None
     return first, traces
 

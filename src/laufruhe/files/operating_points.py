@@ -14,8 +14,9 @@ from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, require_one_of, si_value
 from laufruhe.files.csv_rows import rows_of
+from laufruhe.files.cylinder_states import EACH, cylinder_states
 from laufruhe.files.fields import Name, Table
-from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, Seiliger, Wiebe
+from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
@@ -38,6 +39,14 @@ class OperatingPointTable(Table):
     )
     brake_torque: f.PositiveTorque | None = f.optional("Torque at the brake, in place of bmep.")
     motored: bool = f.optional("The charge is compressed without combustion.", False)
+    misfire: Annotated[
+        list[f.CylinderNumber] | Literal["each"] | None, f.OrWord(list[f.CylinderNumber], "[3]", words=(EACH,))
+    ] = f.optional('Cylinders whose charge is compressed without combustion; "each" makes one point for each cylinder.')
+    cut: list[f.CylinderNumber] | None = f.optional("Cylinders without combustion, whose valves stand still.")
+    cut_valves: Literal["closed", "open"] | None = f.optional(
+        "Valves of cut cylinders: closed (default) over a charge of intake pressure at the largest volume, or open to "
+        "the intake."
+    )
     gas: bool = f.optional("false: no gas at this point.", True)
     up_to: f.Speed | None = f.optional("Highest speed of a range that starts at speed.")
     steps: Annotated[int, Field(ge=2, le=1000)] | None = f.optional("Number of speeds in the range.")
@@ -137,24 +146,28 @@ class Brake:
 
 def operating_points(
     tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float | None,
-    brake: Brake | None,
+    brake: Brake | None, parts: Sequence[SliderCrank],
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
     """Return the operating points of a file; points that give no load have the gas of [gas].
 
-    The stroke [m] turns a mean piston speed into a crank speed; it is None for an engine without pistons.
+    The stroke [m] turns a mean piston speed into a crank speed; it is None for an engine without pistons. `parts` are
+    the slider-cranks in the order of cylinder numbers.
     """
     points = []
     for k, table in enumerate(tables, 1):
         where = f"operating_points[{k}]"
-        speeds = _speeds(table, stroke, where)
+        speeds, states = _speeds(table, stroke, where), cylinder_states(table, parts, where)
         for speed in speeds:
             speed_text = units.quantity_text(speed, "rad/s", 6)
             name = (f"{table.name} {speed_text}" if len(speeds) > 1 else table.name) if table.name else speed_text
             loads = _loads(table, speed, brake, where, name)
             for suffix, imep in loads:
                 load = _loaded(gas, table.model_copy(update={"imep": imep}), cycle, where)
-                share = table.weight / len(speeds) / len(loads)
-                points.append(OperatingPoint(f"{name}{suffix}", speed, load, share))
+                share = table.weight / len(speeds) / len(loads) / len(states)
+                points += [
+                    OperatingPoint(f"{name}{suffix}{state.suffix}", speed, state.gas(load, cycle, where), share)
+                    for state in states
+                ]
     if len(points) > MAX_POINTS:
         rule = f"makes {len(points)} operating points, more than {MAX_POINTS}"
         raise Refused("operating_points", None, rule, "use fewer steps, or sweep the speed in a study")

@@ -275,7 +275,9 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
     wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
-    points = operating_points(loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
+    points = operating_points(
+        loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake, cylinders
+    )
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
         file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, bearings, wheel,

@@ -5,7 +5,7 @@ from laufruhe.machine.bodies import Rod
 from laufruhe.machine.chambers import Chamber, Chambers, GasModel, Pump, Steam
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.flywheel import Arms, Flywheel, Rim
-from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, TrappedCharge, Wiebe
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Bearing, GearedInertia, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
@@ -35,5 +35,6 @@ __all__ = [
     "Shaft",
     "SliderCrank",
     "Steam",
+    "TrappedCharge",
     "Wiebe",
 ]

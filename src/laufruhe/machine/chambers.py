@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.gas import AMBIENT_PRESSURE, PressureTrace, Seiliger, Wiebe, check_pressures
+from laufruhe.machine.gas import (
+    AMBIENT_PRESSURE,
+    PressureTrace,
+    Seiliger,
+    TrappedCharge,
+    Wiebe,
+    check_pressures,
+)
 from laufruhe.machine.slider_crank import SliderCrank
 
 ENDS: Mapping[str, int] = {"head": 1, "crank": -1}
@@ -134,7 +141,7 @@ class Chambers:
         return tuple(chamber for chamber in self.chambers if part.name in chamber.cylinders)
 
 
-CommonGas: TypeAlias = Seiliger | Wiebe | PressureTrace | Chambers
+CommonGas: TypeAlias = Seiliger | Wiebe | PressureTrace | TrappedCharge | Chambers
 
 
 @dataclass(frozen=True)

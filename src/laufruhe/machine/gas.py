@@ -128,6 +128,19 @@ class Wiebe(Charge):
 
 
 @dataclass(frozen=True)
+class TrappedCharge(Charge):
+    """Charge of a cut cylinder, whose valves do not move: p V^n is constant from the largest volume on (G21).
+
+    Attributes
+    ----------
+    exponent
+        Polytropic exponent n; zero if the valves stay open, so that the pressure is that of the intake.
+    """
+
+    exponent: float
+
+
+@dataclass(frozen=True)
 class PressureTrace:
     """Measured cylinder pressure over one cycle.
 

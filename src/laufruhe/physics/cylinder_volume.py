@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Charge, Cycle, SliderCrank
+from laufruhe.machine import Charge, Cycle, SliderCrank, TrappedCharge
 from laufruhe.numerics.arrays import Array
 
 JUMP_WIDTH = 1e-11
@@ -106,6 +106,12 @@ class ChargedCylinder:
         is_closed = local < bottom
         pressures[is_closed] = closed(local[is_closed])
         return pressures
+
+
+def trapped_pressure(gas: TrappedCharge, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
+    """Return the pressure [Pa] of a charge that no valve lets out, at crank angles gamma [rad] (G21)."""
+    cylinder = ChargedCylinder(gas, part, cycle)
+    return np.asarray(gas.intake_pressure * (cylinder.largest / cylinder.volume(angles)) ** gas.exponent)
 
 
 def gas_exchange_pressure(gas: Charge, cycle: Cycle) -> float:

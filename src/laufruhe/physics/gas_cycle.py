@@ -14,16 +14,26 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Chambers, Charge, Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
+from laufruhe.machine import (
+    Chambers,
+    Charge,
+    Cycle,
+    GasModel,
+    PressureTrace,
+    Seiliger,
+    SliderCrank,
+    TrappedCharge,
+    Wiebe,
+)
 from laufruhe.machine.chambers import cylinder_gas
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.cylinder_volume import dead_centres
+from laufruhe.physics.cylinder_volume import dead_centres, trapped_pressure
 from laufruhe.physics.pressure_trace import trace_pressure
 from laufruhe.physics.seiliger_cycle import cut_off_angle, seiliger_pressure
 from laufruhe.physics.wiebe_cycle import wiebe_pressure
 from laufruhe.physics.working_chambers import chambers_breaks, chambers_thrust
 
-OneChamber: TypeAlias = Seiliger | Wiebe | PressureTrace
+OneChamber: TypeAlias = Seiliger | Wiebe | PressureTrace | TrappedCharge
 
 
 def pressure_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
@@ -43,6 +53,8 @@ def pressure_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -
         return trace_pressure(gas, cycle, angles, pace)
     if isinstance(gas, Seiliger):
         return seiliger_pressure(gas, piston, cycle, pace * angles)
+    if isinstance(gas, TrappedCharge):
+        return trapped_pressure(gas, piston, cycle, pace * angles)
     return wiebe_pressure(gas, piston, cycle, pace * angles)
 
 
@@ -90,12 +102,15 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> Array:
     """Return the angles after firing at which a derivative of the pressure jumps [rad] (G13).
 
     Ends of strokes, where valves open and heat comes at once; cut-off; begin and end of a burn; points of a trace.
+    A trapped charge has none.
     """
     gas = cylinder_gas(gas, part)
     if isinstance(gas, Chambers):
         turns = math.tau * np.arange(cycle.turns)
         return np.ravel(chambers_breaks(gas, part)[:, None] + turns)
     gas, piston, cycle, pace = _worked(gas, part, cycle)
+    if isinstance(gas, TrappedCharge):
+        return np.zeros(0)
     if isinstance(gas, PressureTrace):
         breaks = np.array(gas.angles)
     else:

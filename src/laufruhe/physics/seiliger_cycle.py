@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Charge, Cycle, Seiliger, SliderCrank, Wiebe
+from laufruhe.machine import Charge, Cycle, Seiliger, SliderCrank, TrappedCharge, Wiebe
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import rising_root
 from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
@@ -88,10 +88,22 @@ def motored_cycle(gas: Seiliger | Wiebe, cycle: Cycle) -> Seiliger:
 
     Its indicated mean pressure is that of the gas exchange alone.
     """
-    exponent = gas.compression_exponent if isinstance(gas, Seiliger) else gas.heat_ratio
+    exponent = _exponent(gas)
     peak, imep = gas.intake_pressure * gas.compression_ratio**exponent, gas_exchange_pressure(gas, cycle)
-    charge = {number.name: getattr(gas, number.name) for number in fields(Charge)}
-    return Seiliger(peak, imep, compression_exponent=exponent, expansion_exponent=exponent, **charge)
+    return Seiliger(peak, imep, compression_exponent=exponent, expansion_exponent=exponent, **_charge(gas))
+
+
+def trapped_charge(gas: Seiliger | Wiebe, has_open_valves: bool) -> TrappedCharge:
+    """Return the same charge in a cylinder whose valves stay closed, or open to the intake (G21)."""
+    return TrappedCharge(exponent=0.0 if has_open_valves else _exponent(gas), **_charge(gas))
+
+
+def _exponent(gas: Seiliger | Wiebe) -> float:
+    return gas.compression_exponent if isinstance(gas, Seiliger) else gas.heat_ratio
+
+
+def _charge(gas: Charge) -> dict[str, float]:
+    return {number.name: getattr(gas, number.name) for number in fields(Charge)}
 
 
 def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:

@@ -91,7 +91,7 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
     """Return the coefficients of one cylinder's torque by order of the cycle [N m], counted from its firing (T1)."""
-    first = replace(part, name="cylinder", x=0.0, throw=part.bank + part.fires_at, firing_angle=0.0)
+    first = replace(part, x=0.0, throw=part.bank + part.fires_at, firing_angle=0.0)
     return _cylinder_torque(cycle, first, replace(point, name="", weight=1.0), fidelity)
 
 

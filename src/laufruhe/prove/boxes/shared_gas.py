@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.load_models.phase_lead_model import PhaseLeadModel
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank, kinematics
+from laufruhe.machine.chambers import cylinder_gas, models_of
 from laufruhe.machine.facing import Facing
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, lengths
@@ -148,7 +149,7 @@ class SharedGasBoxes:
         motored = replace(problem, points=tuple(replace(point, gas=None) for point in problem.points))
         self._model = PhaseLeadModel(motored)
         self._names = self._model.names
-        if not all(point.gas is None or isinstance(point.gas, Seiliger) for point in problem.points):
+        if not all(isinstance(model, Seiliger) for point in problem.points for model in models_of(point.gas)):
             raise ModelError(
                 "an open lead angle between two cranks that share gas chambers needs the gas model seiliger"
             )
@@ -235,8 +236,9 @@ class SharedGasBoxes:
             total = np.zeros(CELLS * engine.cycle.turns)
             gas = self.problem.fidelity.gas_of(point)
             for part in engine.slider_cranks:
-                if part.name in self._fixed and isinstance(gas, Seiliger):
-                    change = torque_change(gas, part, engine.cycle, half)
+                model = gas and cylinder_gas(gas, part)
+                if part.name in self._fixed and isinstance(model, Seiliger):
+                    change = torque_change(model, part, engine.cycle, half)
                     place = math.floor(part.firing_angle / engine.cycle.angle * len(total))
                     total = total + np.maximum(np.roll(change, place), np.roll(change, place + 1))
             torques.append(total)
