@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal, Protocol
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
+from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
+from laufruhe.files.fields import Table
 from laufruhe.files.gas import names_of_cylinders
 from laufruhe.machine import Cycle, GasModel, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases
@@ -15,17 +17,17 @@ from laufruhe.physics.seiliger_cycle import motored_cycle, trapped_charge
 EACH = "each"
 
 
-class StateTable(Protocol):
-    """Keys of an operating point that name cylinders without combustion, and keys that contradict them."""
+class StateTable(Table):
+    """Cylinders of an operating point that have no combustion."""
 
-    name: str | None
-    misfire: list[int] | Literal["each"] | None
-    cut: list[int] | None
-    cut_valves: Literal["closed", "open"] | None
-    motored: bool
-    gas: bool
-    bmep: float | None
-    brake_torque: float | None
+    misfire: Annotated[
+        list[f.CylinderNumber] | Literal["each"] | None, f.OrWord(list[f.CylinderNumber], "[3]", words=(EACH,))
+    ] = f.optional('Cylinders whose charge is compressed without combustion; "each" makes one point for each cylinder.')
+    cut: list[f.CylinderNumber] | None = f.optional("Cylinders without combustion, whose valves stand still.")
+    cut_valves: Literal["closed", "open"] | None = f.optional(
+        "Valves of cut cylinders: closed (default) over a charge of intake pressure at the largest volume, or open to "
+        "the intake."
+    )
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,10 @@ class CylinderState:
         """Return the gas of the engine in this state, from the gas with combustion in every cylinder."""
         if not self.misfire and not self.cut:
             return gas
-        gases = gas if isinstance(gas, CylinderGases) else None
+        gases = gas if isinstance(gas, CylinderGases) else gas and CylinderGases(gas, ())
 
         def fired(name: str, key: str) -> Seiliger | Wiebe:
-            model = gases.of_cylinder(name) if gases else gas
+            model = gases and gases.of_cylinder(name)
             if not isinstance(model, Seiliger | Wiebe):
                 rule = "needs [gas] with model seiliger or wiebe, which gives the pressure without combustion"
                 raise Refused(f"{where}.{key}", name, rule, "give [gas] such a model, or remove this key")
@@ -62,55 +64,37 @@ class CylinderState:
 
         unfired: dict[str, CommonGas] = {name: motored_cycle(fired(name, "misfire"), cycle) for name in self.misfire}
         unfired |= {name: trapped_charge(fired(name, "cut"), self.has_open_valves) for name in self.cut}
-        if gases:
-            return CylinderGases(gases.common, tuple((dict(gases.single) | unfired).items()))
-        common = fired(next(iter(unfired)), "misfire")
-        return CylinderGases(common, tuple(unfired.items()))
+        return gases and replace(gases, single=tuple((dict(gases.single) | unfired).items()))
 
 
-def cylinder_states(table: StateTable, parts: Sequence[SliderCrank], where: str) -> list[CylinderState]:
+def cylinder_states(
+    table: StateTable, parts: Sequence[SliderCrank], where: str, is_named: bool
+) -> list[CylinderState]:  # fmt: skip
     """Return the states of an operating point: one, or one for each cylinder that may misfire.
 
-    `parts` are the slider-cranks in the order of cylinder numbers.
+    `parts` are the slider-cranks in the order of cylinder numbers. A point with a name of its own keeps it.
     """
-    _check_keys(table, where)
+    for key in ("misfire", "cut"):
+        if getattr(table, key) == []:
+            raise Refused(f"{where}.{key}", [], "is empty", "name a cylinder, or remove this key")
+    if table.cut_valves is not None and table.cut is None:
+        raise Refused(f"{where}.cut_valves", table.cut_valves, "is given without cut cylinders", "add cut = [1]")
     cut = _names(table.cut or (), parts, f"{where}.cut")
-    if table.misfire == EACH:
+    if isinstance(table.misfire, str):
         # two pistons in one cylinder misfire together, and a piston without a bore does not fire
         each = (_names([k], parts, where) for k, part in enumerate(parts, 1) if part.bore != 0.0)
-        misfires = [names for names in dict.fromkeys(each) if not set(names) & set(cut)]
+        misfires, is_named = [names for names in dict.fromkeys(each) if not set(names) & set(cut)], False
     else:
         misfires = [_names(table.misfire or (), parts, f"{where}.misfire")]
         if set(misfires[0]) & set(cut):
             raise Refused(f"{where}.cut", table.cut, "has cylinders of misfire too", "keep each cylinder in one list")
     if not misfires:
-        rule = "leaves no cylinder that fires to misfire"
-        raise Refused(f"{where}.misfire", table.misfire, rule, "cut fewer cylinders, or remove misfire")
-    is_named, words = table.name is not None and table.misfire != EACH, _words(cut, "cut")
-    return [
-        CylinderState(
-            names, cut, table.cut_valves == "open",
-            "" if is_named else _words(names, "misfires" if len(names) == 1 else "misfire") + words,
-        )
-        for names in misfires
-    ]  # fmt: skip
-
-
-def _check_keys(table: StateTable, where: str) -> None:
-    """Raise `Refused` for keys of an operating point that contradict its cylinders without combustion."""
-    if table.cut_valves is not None and table.cut is None:
-        raise Refused(f"{where}.cut_valves", table.cut_valves, "is given without cut cylinders", "add cut = [1]")
-    for key in ("misfire", "cut"):
-        if getattr(table, key) is None:
-            continue
-        if not getattr(table, key):
-            raise Refused(f"{where}.{key}", [], "is empty", "name a cylinder, or remove this key")
-        if table.motored or not table.gas:
-            rule = "is given for a point that has no combustion in any cylinder"
-            raise Refused(f"{where}.{key}", None, rule, "remove this key, or motored and gas")
-        if table.bmep is not None or table.brake_torque is not None:
-            rule = "is given beside a load at the brake, which is that of an engine whose cylinders all fire"
-            raise Refused(f"{where}.{key}", None, rule, "give imep, the mean pressure of the cylinders that fire")
+        rule, remedy = "leaves no cylinder that fires to misfire", "cut fewer cylinders, or remove misfire"
+        raise Refused(f"{where}.misfire", table.misfire, rule, remedy)
+    words = ["" if is_named else _words(n, "misfires" if len(n) == 1 else "misfire") for n in misfires]
+    end = "" if is_named else _words(cut, "cut")
+    has_open_valves = table.cut_valves == "open"
+    return [CylinderState(n, cut, has_open_valves, word + end) for n, word in zip(misfires, words, strict=True)]
 
 
 def _names(numbers: Sequence[int], parts: Sequence[SliderCrank], where: str) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, require_one_of, si_value
 from laufruhe.files.csv_rows import rows_of
-from laufruhe.files.cylinder_states import EACH, cylinder_states
+from laufruhe.files.cylinder_states import StateTable, cylinder_states
 from laufruhe.files.fields import Name, Table
 from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases
@@ -27,7 +27,7 @@ SAME_SPEED = 0.01
 """Relative difference of speeds within which rows of a fuel table belong together."""
 
 
-class OperatingPointTable(Table):
+class OperatingPointTable(StateTable):
     """A speed and a load."""
 
     name: Name | None = None
@@ -39,14 +39,6 @@ class OperatingPointTable(Table):
     )
     brake_torque: f.PositiveTorque | None = f.optional("Torque at the brake, in place of bmep.")
     motored: bool = f.optional("The charge is compressed without combustion.", False)
-    misfire: Annotated[
-        list[f.CylinderNumber] | Literal["each"] | None, f.OrWord(list[f.CylinderNumber], "[3]", words=(EACH,))
-    ] = f.optional('Cylinders whose charge is compressed without combustion; "each" makes one point for each cylinder.')
-    cut: list[f.CylinderNumber] | None = f.optional("Cylinders without combustion, whose valves stand still.")
-    cut_valves: Literal["closed", "open"] | None = f.optional(
-        "Valves of cut cylinders: closed (default) over a charge of intake pressure at the largest volume, or open to "
-        "the intake."
-    )
     gas: bool = f.optional("false: no gas at this point.", True)
     up_to: f.Speed | None = f.optional("Highest speed of a range that starts at speed.")
     steps: Annotated[int, Field(ge=2, le=1000)] | None = f.optional("Number of speeds in the range.")
@@ -156,7 +148,9 @@ def operating_points(
     points = []
     for k, table in enumerate(tables, 1):
         where = f"operating_points[{k}]"
-        speeds, states = _speeds(table, stroke, where), cylinder_states(table, parts, where)
+        _check_combustion(table, where)
+        speeds = _speeds(table, stroke, where)
+        states = cylinder_states(table, parts, where, table.name is not None)
         for speed in speeds:
             speed_text = units.quantity_text(speed, "rad/s", 6)
             name = (f"{table.name} {speed_text}" if len(speeds) > 1 else table.name) if table.name else speed_text
@@ -173,6 +167,19 @@ def operating_points(
         raise Refused("operating_points", None, rule, "use fewer steps, or sweep the speed in a study")
     require_distinct([p.name for p in points], "operating_points", "operating points have one name")
     return tuple(points)
+
+
+def _check_combustion(table: OperatingPointTable, where: str) -> None:
+    """Raise `Refused` for single cylinders without combustion at a point whose other keys contradict them."""
+    for key in ("misfire", "cut"):
+        if getattr(table, key) is None:
+            continue
+        if table.motored or not table.gas:
+            rule = "is given for a point that has no combustion in any cylinder"
+            raise Refused(f"{where}.{key}", None, rule, "remove this key, or motored and gas")
+        if table.bmep is not None or table.brake_torque is not None:
+            rule = "is given beside a load at the brake, which is that of an engine whose cylinders all fire"
+            raise Refused(f"{where}.{key}", None, rule, "give imep, the mean pressure of the cylinders that fire")
 
 
 def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tuple[float, ...]:
