@@ -62,11 +62,11 @@ class EngineParts(Parts):
         return self._with("phasing", "phasing", keys_of(locals()))
 
     def operating_point(
-        self, name: str | None = None, *, speed: Value | None = None, mean_piston_speed: Value | None = None,
-        imep: Value | None = None, bmep: Value | None = None, brake_torque: Value | None = None,
-        motored: bool | None = None, misfire: Sequence[int] | Literal["each"] | None = None,
-        cut: Sequence[int] | None = None, cut_valves: Literal["closed", "open"] | None = None, gas: bool | None = None,
-        up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
+        self, name: str | None = None, *, misfire: Sequence[int] | Literal["each"] | None = None,
+        cut: Sequence[int] | None = None, cut_valves: Literal["closed", "open"] | None = None,
+        speed: Value | None = None, mean_piston_speed: Value | None = None, imep: Value | None = None,
+        bmep: Value | None = None, brake_torque: Value | None = None, motored: bool | None = None,
+        gas: bool | None = None, up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
     ) -> Self:
         """Return the engine with an operating point.
 
@@ -76,6 +76,13 @@ class EngineParts(Parts):
         ----------
         name
             Name in tables, pictures and messages.
+        misfire
+            Cylinders whose charge is compressed without combustion; "each" makes one point for each cylinder.
+        cut
+            Cylinders without combustion, whose valves stand still.
+        cut_valves
+            Valves of cut cylinders: closed (default) over a charge of intake pressure at the largest volume, or open to
+            the intake.
         speed
             Speed of the crank [rad/s].
         mean_piston_speed
@@ -88,13 +95,6 @@ class EngineParts(Parts):
             Torque at the brake, in place of bmep [N m].
         motored
             The charge is compressed without combustion.
-        misfire
-            Cylinders whose charge is compressed without combustion; "each" makes one point for each cylinder.
-        cut
-            Cylinders without combustion, whose valves stand still.
-        cut_valves
-            Valves of cut cylinders: closed (default) over a charge of intake pressure at the largest volume, or open to
-            the intake.
         gas
             false: no gas at this point.
         up_to
