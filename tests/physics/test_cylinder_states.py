@@ -12,11 +12,12 @@ import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.machine import Cycle, Seiliger, SliderCrank
 from laufruhe.machine.chambers import CylinderGases
+from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.seiliger_cycle import trapped_charge
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, cylinder_torque
+from laufruhe.physics.torque import crank_torque, cylinder_torque, torque_facts
 
 RADIUS, ROD, BORE, RATIO, N1, INTAKE, EXHAUST = 0.0425, 0.14, 0.08, 10.0, 1.35, 0.6e5, 1.1e5
 AIR, IMEP, PEAK = 101_325.0, 4e5, 30e5
@@ -135,6 +136,21 @@ def test_torsion_takes_the_gas_of_each_cylinder() -> None:
         for part in engine.slider_cranks
     ]
     np.testing.assert_allclose(np.sum(each, axis=0), total, atol=1e-9 * abs(total).max())
+
+
+def test_bearings_and_flywheel_follow_the_state() -> None:
+    """The rods' forces on their pins drive the crank with its torque, and the work stored is that of the torque."""
+    tables = engine_tables({"name": "p", "speed": "900 rpm", "misfire": [2], "cut": [4]})
+    problem = laufruhe.load({**tables, "flywheel": {"inertia": "0.3 kg m^2"}})
+    engine, point = problem.engine, problem.points[0]
+    torque, forces = crank_torque(engine, point).sample(STEPS // 8), pin_forces(engine, point).sample(STEPS // 8)
+    angle = 4.0 * math.pi * np.arange(STEPS // 8) / (STEPS // 8)
+    driven = np.zeros_like(torque)
+    for part, force in zip(engine.slider_cranks, forces.swapaxes(0, 1), strict=True):
+        driven += RADIUS * (force[:, 1] * np.cos(angle + part.throw) - force[:, 2] * np.sin(angle + part.throw))
+    np.testing.assert_allclose(driven, torque, atol=2e-4 * np.abs(torque).max())
+    work = np.cumsum(torque - torque.mean()) * 32.0 * math.pi / STEPS
+    assert torque_facts(engine, point).excursion == pytest.approx(np.ptp(work), rel=1e-3)
 
 
 def test_each_makes_a_point_for_each_cylinder_and_shares_the_weight() -> None:

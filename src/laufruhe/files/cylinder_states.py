@@ -14,14 +14,14 @@ from laufruhe.machine import Cycle, GasModel, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases
 from laufruhe.physics.seiliger_cycle import motored_cycle, trapped_charge
 
-EACH = "each"
+SINGLY = "each"
 
 
 class StateTable(Table):
     """Cylinders of an operating point that have no combustion."""
 
     misfire: Annotated[
-        list[f.CylinderNumber] | Literal["each"] | None, f.OrWord(list[f.CylinderNumber], "[3]", words=(EACH,))
+        list[f.CylinderNumber] | Literal["each"] | None, f.OrWord(list[f.CylinderNumber], "[3]", words=(SINGLY,))
     ] = f.optional('Cylinders whose charge is compressed without combustion; "each" makes one point for each cylinder.')
     cut: list[f.CylinderNumber] | None = f.optional("Cylinders without combustion, whose valves stand still.")
     cut_valves: Literal["closed", "open"] | None = f.optional(
@@ -82,8 +82,8 @@ def cylinder_states(
     cut = _names(table.cut or (), parts, f"{where}.cut")
     if isinstance(table.misfire, str):
         # two pistons in one cylinder misfire together, and a piston without a bore does not fire
-        each = (_names([k], parts, where) for k, part in enumerate(parts, 1) if part.bore != 0.0)
-        misfires, is_named = [names for names in dict.fromkeys(each) if not set(names) & set(cut)], False
+        single = (_names([k], parts, where) for k, part in enumerate(parts, 1) if part.bore != 0.0)
+        misfires, is_named = [names for names in dict.fromkeys(single) if not set(names) & set(cut)], False
     else:
         misfires = [_names(table.misfire or (), parts, f"{where}.misfire")]
         if set(misfires[0]) & set(cut):
