@@ -24,7 +24,6 @@ from pages import PAGES, ROOT, publish
 from laufruhe import evaluate_many, load, solve
 from laufruhe.physics.shaking_loads import forget
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.solvers.prices import angle_name
 
 OUT = PAGES / "growth.md"
 # an evaluation is repeated for so long [s], and the least of so many rounds is taken
@@ -274,7 +273,7 @@ def many_designs(source: Any, count: int) -> float:
     """Seconds of so many designs with random unbalances, evaluated in one call; each design has the whole circle."""
     problem, random = load(source), np.random.default_rng(1)
     designs = {decision.name: random.uniform(decision.lower, decision.upper, count) for decision in problem.decisions}
-    designs |= {angle_name(decision): random.uniform(0.0, math.tau, count) for decision in problem.decisions}
+    designs |= {decision.angle_name: random.uniform(0.0, math.tau, count) for decision in problem.decisions}
     began = time.process_time()
     table = evaluate_many(problem, designs)
     took = time.process_time() - began

@@ -33,7 +33,6 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
@@ -73,7 +72,7 @@ def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
         if decision.name not in numbers:
             values[decision.name] = decision.start
         elif decision.is_affine and decision.set.width > 1:
-            values[decision.name] = numbers[decision.name] * cmath.exp(1j * numbers[angle_name(decision)])
+            values[decision.name] = numbers[decision.name] * cmath.exp(1j * numbers[decision.angle_name])
         else:
             unit = decision.set.directions[0]
             values[decision.name] = numbers[decision.name] * (unit if decision.is_affine else 1.0)
@@ -178,7 +177,7 @@ def _slider(domain: Domain, problem: Problem) -> Slider:
     decision, domain_set = domain.decision, domain.set
     return Slider(
         decision.name, decision.unit, domain.start, domain.width, domain_set.lower, domain_set.upper, domain_set.angles,
-        angle_name(decision), *_unit(problem, decision),
+        decision.angle_name, *_unit(problem, decision),
     )  # fmt: skip
 
 

@@ -18,7 +18,6 @@ from laufruhe.files.toml_text import toml_text, toml_value
 from laufruhe.machine import Engine
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 
 SEARCHED = ("phasing", "robust", "search", "assembly")
@@ -59,7 +58,7 @@ def saved_file(problem: Problem, result: Result, slider_problem: Problem, values
     tables: Mapping[str, Any] = problem.origin.tables
     numbers, starts = list[tuple[str, str, str]](), list[float]()
     for decision in slider_problem.decisions:
-        entries = ((decision.name, decision.unit), (angle_name(decision), "rad"))[: decision.set.width]
+        entries = ((decision.name, decision.unit), (decision.angle_name, "rad"))[: decision.set.width]
         numbers += [(f"@{name}@", name, unit) for name, unit in entries]
         starts += decision.set.split(decision.start)[: decision.set.width]
     try:

@@ -26,7 +26,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, gap_of, make_certificate, unproven_certificate
 from laufruhe.prove.witness import Witness
 from laufruhe.solvers.accuracy import objective_error
-from laufruhe.solvers.prices import ACTIVE, Price, angle_name
+from laufruhe.solvers.prices import ACTIVE, Price
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import why_no_order
 from laufruhe.solvers.values import DecisionValue, LimitValue, NearestDesign, ObjectiveValue
@@ -465,7 +465,7 @@ def values_of(problem: Problem, result: Result) -> list[Value]:
         size = sizes.get(decision.name)
         if size is None or not decision.is_affine:
             return decision.start if size is None else size
-        return cmath.rect(size, sizes.get(angle_name(decision), decision.set.angles[0]))
+        return cmath.rect(size, sizes.get(decision.angle_name, decision.set.angles[0]))
 
     return [value(decision) for decision in problem.decisions]
 
@@ -502,5 +502,5 @@ def decision_values(decision: Decision, value: Value) -> tuple[DecisionValue, ..
         return (entry,)
     low_angle, high_angle = bounds.angles
     at_angle_bound = not bounds.free_angle and size > tolerance and min(angle - low_angle, high_angle - angle) < 1e-6
-    name = angle_name(decision)
+    name = decision.angle_name
     return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, initial_angle, at_angle_bound)

@@ -27,7 +27,6 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
-from laufruhe.solvers.prices import angle_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,7 +88,7 @@ def _units(problem: Problem) -> dict[str, str]:
     for decision in problem.decisions:
         named[decision.name] = decision.unit
         if decision.set.width > 1:
-            named[angle_name(decision)] = "rad"
+            named[decision.angle_name] = "rad"
     return named
 
 
@@ -141,7 +140,7 @@ def values_of_columns(
     values, inside = np.empty((count, len(decisions)), dtype=complex), np.ones((count, len(decisions)), dtype=bool)
     for k, decision in enumerate(decisions):
         size, angle = (np.full(count, start) for start in decision.set.split(decision.start))
-        for part, name in ((size, decision.name), (angle, angle_name(decision))):
+        for part, name in ((size, decision.name), (angle, decision.angle_name)):
             if name in columns:
                 missing = np.isnan(columns[name])
                 columns[name][missing] = part[missing]

@@ -231,7 +231,7 @@ def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
     for edge, sign in zip(bounds.edges, (-1.0, 1.0), strict=False):
         if direction @ edge >= 1.0 - EDGE:
             # a rotation by one radian moves the vector by its size
-            normals[angle_name(decision)] = sign * turn / size
+            normals[decision.angle_name] = sign * turn / size
     return normals
 
 
@@ -330,8 +330,3 @@ def _disc_segments(slope: Array) -> list[Array]:
         return list(axes)
     turns = math.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
     return [0.5 * math.pi / _DIRECTIONS * (math.cos(t) * axes[0] + math.sin(t) * axes[1]) for t in turns]
-
-
-def angle_name(decision: Decision) -> str:
-    """Return the name of the angle that belongs to the size of a decision."""
-    return decision.angle_name

@@ -10,7 +10,6 @@ from laufruhe.machine import Rotor, SliderCrank
 from laufruhe.machine.rotor import Role
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, bore_of
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.prices import angle_name
 
 STEPS = 72
 """Steps over one turn of the crank."""
@@ -65,7 +64,7 @@ def _rotor(problem: Problem, rotor: Rotor) -> dict[str, Any]:
             if drive.rotor == rotor.name:
                 constant -= complex(drive.of(decision.start))
                 gains = [complex(drive.of(direction)) for direction in decision.set.directions]
-                angle = angle_name(decision) if decision.set.width > 1 else None
+                angle = decision.angle_name if decision.set.width > 1 else None
                 drives.append({"name": decision.name, "angle": angle, "gains": [[g.real, g.imag] for g in gains]})
     return {
         "name": rotor.name,

@@ -21,7 +21,6 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, FEASIBLE, evaluate_design, unbalance_values
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.tie_break import distance
-from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionRange
 
@@ -167,7 +166,7 @@ def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
         turns = [cmath.phase(domain.complex_value(design) / first) for design in designs]
         if max(turns) - min(turns) > FREE:
             angle = cmath.phase(first)
-            ranges.append(DecisionRange(angle_name(decision), "rad", angle + min(turns), angle + max(turns)))
+            ranges.append(DecisionRange(decision.angle_name, "rad", angle + min(turns), angle + max(turns)))
     return ranges
 
 
