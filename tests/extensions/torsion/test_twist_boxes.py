@@ -26,6 +26,22 @@ WHEEL = {"name": "flywheel", "end": "rear", "shaft": {"stiffness": "6e5 N m/rad"
 ROUND = {"pieces": [{"length": "70 mm", "bore": "12 mm",
                      "diameter": {"between": ["40 mm", "60 mm"], "start": "48 mm"}}]}  # fmt: skip
 SOFT = {"stiffness": {"between": ["2e5 N m/rad", "6e5 N m/rad"], "start": "4e5 N m/rad"}, "diameter": "48 mm"}
+BRANCH = {
+    "on": "pulley",
+    "ratio": -2.5,
+    "gear_inertia": "0.001 kg m^2",
+    "discs": [
+        {
+            "name": "generator",
+            "inertia": INERTIA,
+            "damping": "0.02 N m s/rad",
+            "shaft": {
+                "stiffness": {"between": ["2e3 N m/rad", "2e4 N m/rad"], "start": "1e4 N m/rad"},
+                "loss_factor": 0.1,
+            },
+        }
+    ],
+}
 
 CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "viscous": ({"absorbers": [VISCOUS]}, {"minimise": "rms shaft stress"}),
@@ -38,6 +54,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"minimise": "rms shaft twist", "orders": [0, 5]},
     ),
     "flywheel": ({"discs": [WHEEL], "crank": SOFT}, {"minimise": "rms shaft stress"}),
+    "branch": ({"branches": [BRANCH], "absorbers": [RUBBER | {"on": "generator"}]}, {"minimise": "rms shaft torque"}),
 }
 
 

@@ -203,7 +203,7 @@ class TwistBoxes:
             low, high = (dynamic_stiffness(coordinates.chain(x), orders, speed) for x in ends)
             sides.append((high - low) / (coordinates.upper[k] - coordinates.lower[k]))
         highest = len(torques.coefficients) - 1
-        twisted = _twist_of(len(chain.sections), middle_stiffness.shape[-1])
+        twisted = chain.incidence[: len(chain.sections)]
         along = directions_of([
             [*side.real, *side.imag, row[:, None] * twisted]
             for side, row in zip(sides, coordinates.owners, strict=True)
@@ -250,7 +250,7 @@ class TwistBoxes:
     ) -> LinearResponse:
         """Return the alternating torque or stress of chosen shaft sections as linear functions over a box."""
         root, factors = np.sqrt(inertias(chains[1])), FACTORS[measure.channel]
-        twisted = _twist_of(len(chains[1].sections), len(root))
+        twisted = chains[1].incidence[: len(chains[1].sections)]
         scaled = twisted / root
         low, centre, high = (
             factors(chain, excitation.orders, excitation.loads.point.speed)[:, chosen, None] for chain in chains
@@ -292,8 +292,7 @@ class TwistBoxes:
             point = excitation.loads.point
             rate = excitation.orders * point.speed
             for k, absorber in enumerate(chains[0].absorbers if limit.measure.includes_point(point) else ()):
-                row = np.zeros(len(root))
-                row[len(chains[0].discs) + k], row[chains[0].index(absorber.on)] = 1.0, -1.0
+                row = chains[0].incidence[len(chains[0].sections) + k]
                 swing = mapped(twist, np.broadcast_to(row / root, (1, len(rate), 1, len(root))))
                 lost = 0.5 * absorber.losses(rate, point.speed)
                 if _root_bound([(1.0, root_under(swing, lost))]) ** 2 > limit.maximum * (1.0 + SLACK):
@@ -312,10 +311,6 @@ class TwistBoxes:
         if limit.outside is not None:
             broken |= (low > limit.outside[0] * (1.0 + SLACK)) & (high < limit.outside[1] * (1.0 - SLACK))
         return bool(np.any(broken))
-
-
-def _twist_of(sections: int, angles: int) -> Array:
-    return np.asarray(np.eye(sections, angles) - np.eye(sections, angles, 1))
 
 
 def _turns(measure: Measure) -> bool:

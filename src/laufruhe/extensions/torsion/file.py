@@ -1,4 +1,4 @@
-"""[torsion] of a problem file: discs, shafts and absorbers of the crankshaft (V1-V3)."""
+"""[torsion] of a problem file: discs, shafts, geared branches and absorbers of the crankshaft (V1-V3, V16)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laufruhe.extensions.torsion.machine import STEEL, TORSION, Absorber, Disc, 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, nearest, require_one_of
 from laufruhe.files.fields import ListOrSingle, Name, Number, Open, Table
-from laufruhe.files.nested import Place
+from laufruhe.files.nested import Place, at
 from laufruhe.files.problem_file import ExtensionContext, Key
 from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.machine.layouts import Throw
@@ -68,14 +68,30 @@ class CrankTable(SectionTable):
     stiffness: TorsionalStiffnesses | None = None
 
 
-class DiscTable(Table):
-    """A disc in addition to the throws."""
+class BranchDiscTable(Table):
+    """A disc of a branch."""
 
     name: Name
-    end: Literal["front", "rear"]
     inertia: f.OpenInertia
     damping: TorsionalDamping = f.optional("Viscous damping against the block.", 0.0)
     shaft: TorsionShaftTable = f.required("Shaft from this disc to the next one towards the throws.")
+
+
+class DiscTable(BranchDiscTable):
+    """A disc in addition to the throws."""
+
+    end: Literal["front", "rear"]
+
+
+class BranchTable(Table):
+    """Shaft that gears, a belt or a chain drive from a disc: a camshaft, pump, propeller or generator."""
+
+    on: str = f.required("Name of the disc that drives it: of the crankshaft, or of a branch before it.")
+    ratio: f.Ratio = f.required("Speed over that of this disc; negative runs against it.")
+    gear_inertia: f.PositiveInertia | None = f.optional(
+        "Inertia of its gear, which follows the disc without twist, at the speed of the branch."
+    )
+    discs: list[BranchDiscTable] = f.optional("Discs of the branch, from its gear.", [])
 
 
 class AbsorberTable(Table):
@@ -106,6 +122,7 @@ class TorsionTable(Table):
     output: str | None = f.optional("Disc at which the driven machine takes its torque; the last one by default.")
     crank: CrankTable | None = None
     discs: list[DiscTable] = Field(default_factory=list)
+    branches: list[BranchTable] = Field(default_factory=list)
     absorbers: list[AbsorberTable] = Field(default_factory=list)
 
 
@@ -131,8 +148,9 @@ def _chain(
         if part.shaft != CRANKSHAFT:
             rule = f"is modelled for one crankshaft, and the throw of {part.name} is on shaft '{part.shaft.name}'"
             raise Refused("torsion", None, rule, "leave it out")
-    if len(table.discs) > MAX_DISCS:
-        rule = f"has {len(table.discs)} discs, and at most {MAX_DISCS} may be given beside the throws"
+    count = len(table.discs) + sum(len(branch.discs) for branch in table.branches)
+    if count > MAX_DISCS:
+        rule = f"has {count} discs, and at most {MAX_DISCS} may be given beside the throws"
         raise Refused("torsion.discs", None, rule, "combine neighbouring discs into one")
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
     open_numbers, discs_of_throws = _OpenNumbers(), _throw_discs(table, parts, throws)
@@ -144,7 +162,7 @@ def _chain(
         ]
         for disc_tables in (ends["front"], ends["rear"])
     )
-    discs = (*front, *discs_of_throws, *rear)
+    discs = [*front, *discs_of_throws, *rear]
     names = [disc.name for disc in discs]
     links = [f"{a} - {b}" for a, b in itertools.pairwise(names)]
     joined = [*links[: len(front)], *links[len(links) - len(rear) :]]
@@ -155,7 +173,11 @@ def _chain(
         for (k, disc), link in zip((*ends["front"], *ends["rear"]), joined, strict=True)
     ]
     crank = _crank_sections(table, links[len(front) : len(links) - len(rear)], open_numbers)
-    sections = (*shafts[: len(front)], *crank, *shafts[len(front) :])
+    sections, parents = [*shafts[: len(front)], *crank, *shafts[len(front) :]], list(range(len(links)))
+    output = table.output or discs[-1].name
+    for k, branch in enumerate(table.branches, 1):
+        _add_branch(branch, table, f"torsion.branches[{k}]", discs, sections, parents, open_numbers)
+    names = [disc.name for disc in discs]
     if table.output is not None and table.output not in names:
         raise Refused("torsion.output", table.output, "is no disc", nearest(table.output, names))
     if table.speeds is not None and not table.speeds[0] < table.speeds[1]:
@@ -167,7 +189,31 @@ def _chain(
     ]
     with errors_at_key("torsion"):
         speeds = None if table.speeds is None else (table.speeds[0], table.speeds[1])
-        return Torsion(discs, sections, tuple(absorbers), table.output or "", speeds), open_numbers.decisions
+        chain = Torsion(tuple(discs), tuple(sections), tuple(absorbers), output, speeds, tuple(parents))
+    return chain, open_numbers.decisions
+
+
+def _add_branch(
+    branch: BranchTable, table: TorsionTable, where: str, discs: list[Disc], sections: list[ShaftSection],
+    parents: list[int], open_numbers: _OpenNumbers,
+) -> None:  # fmt: skip
+    """Add the discs and shafts of a branch, and the inertia of its gear to the disc that drives it (V16)."""
+    names = [disc.name for disc in discs]
+    if branch.on not in names:
+        raise Refused(f"{where}.on", branch.on, "is no disc before this branch", nearest(branch.on, names))
+    if not branch.discs and branch.gear_inertia is None:
+        raise Refused(f"{where}.discs", None, "is missing", "give the branch discs, or a gear_inertia")
+    parent = names.index(branch.on)
+    ratio = discs[parent].ratio * branch.ratio
+    geared = (branch.gear_inertia or 0.0) * branch.ratio**2
+    discs[parent] = replace(discs[parent], inertia=discs[parent].inertia + geared)
+    for k, disc in enumerate(branch.discs, 1):
+        inertia = open_numbers.number(disc.inertia, "inertia", "kg m^2", disc.name, [disc.name])
+        link, place = f"{discs[parent].name} - {disc.name}", f"{where}.discs[{k}].shaft"
+        sections += _section(disc.shaft, table, place, disc.shaft.stiffness, disc.name, [link], open_numbers)
+        parents.append(parent)
+        parent = len(discs)
+        discs.append(Disc(disc.name, inertia, disc.damping, ratio=ratio))
 
 
 def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> list[Disc]:
@@ -314,11 +360,13 @@ def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> P
 
 
 def _numbers(table: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:
-    for kind in ("absorbers", "discs"):
-        for k, one in enumerate(table.get(kind, ())):
-            label, place = f"torsion.{one.get('name')}", ("torsion", kind, k)
-            yield label, place
-            yield from _shaft_numbers(label, (*place, "shaft"), one.get("shaft"))
+    places: list[Place] = [("absorbers",), ("discs",)]
+    places += [("branches", k, "discs") for k in range(len(table.get("branches", ())))]
+    for place in places:
+        for k, one in enumerate(at(table, place) or ()):
+            label, address = f"torsion.{one.get('name')}", ("torsion", *place, k)
+            yield label, address
+            yield from _shaft_numbers(label, (*address, "shaft"), one.get("shaft"))
     yield from _shaft_numbers("torsion.crank", ("torsion", "crank"), table.get("crank"))
 
 

@@ -1,4 +1,4 @@
-"""Crankshaft as discs on massless shafts, with absorbers."""
+"""Crankshaft as discs on massless shafts, with absorbers and geared branches."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.extra import Extra
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.torque import reduced_inertia
 from laufruhe.problem.decision import Kind
 
@@ -25,7 +27,7 @@ STEEL = 80e9
 
 @dataclass(frozen=True)
 class Disc:
-    """Rigid disc of the torsional chain: a throw, flywheel or pulley that turns with the crankshaft.
+    """Rigid disc of the torsional chain: a throw, flywheel or pulley, or a disc of a geared branch.
 
     Attributes
     ----------
@@ -35,23 +37,28 @@ class Disc:
         Viscous damping against the block [N m s/rad].
     cylinders
         Names of the slider-cranks that drive it; empty for a pulley or a flywheel.
+    ratio
+        Speed over that of the crankshaft; negative against the crank.
     """
 
     name: str
     inertia: float
     damping: float = 0.0
     cylinders: tuple[str, ...] = ()
+    ratio: float = 1.0
 
     def __post_init__(self) -> None:
         if not self.inertia > 0.0:
             raise ModelError(f"disc '{self.name}' has an inertia of {self.inertia:g} kg m2; it must be positive")
         if self.damping < 0.0:
             raise ModelError(f"disc '{self.name}' has a negative damping; give zero or more")
+        if self.ratio == 0.0:
+            raise ModelError(f"disc '{self.name}' has a ratio of zero; give its speed over that of the crankshaft")
 
 
 @dataclass(frozen=True)
 class ShaftSection:
-    """Massless shaft between two discs.
+    """Massless shaft between two discs; it turns at the speed of the rear one.
 
     Attributes
     ----------
@@ -118,7 +125,7 @@ class Absorber:
     damping
         Viscous damping between disc and ring [N m s/rad].
     order
-        Order that a pendulum is tuned to: the pull of its rotation is a spring J (n w)^2 (V11).
+        Order of the crankshaft that a pendulum is tuned to: the pull of its rotation is a spring J (n w)^2 (V11).
     damping_ratio
         Share of its critical damping that a pendulum has.
     """
@@ -155,20 +162,22 @@ class Absorber:
 
 @dataclass(frozen=True)
 class Torsion(Extra):
-    """Chain of discs and shafts from front to rear, with absorbers on it.
+    """Discs and shafts from front to rear, with geared branches and absorbers: a tree (V16).
 
     Attributes
     ----------
     discs
-        Discs from the front (C3).
+        Discs from the front (C3), then those of the branches.
     sections
-        Shafts from each disc to the next, one fewer than discs.
+        Shafts in front of each disc but the first, one fewer than discs.
     absorbers
         Absorbers on any of the discs.
     output
         Name of the disc where the load takes its torque.
     speeds
         Least and largest crank speed of tables and pictures [rad/s]; None for a range about the operating points.
+    parents
+        Index of the disc at the front of each section; empty if it is the previous disc, without branches.
     """
 
     discs: tuple[Disc, ...]
@@ -176,6 +185,7 @@ class Torsion(Extra):
     absorbers: tuple[Absorber, ...] = ()
     output: str = ""
     speeds: tuple[float, float] | None = None
+    parents: tuple[int, ...] = ()
     name: ClassVar[str] = TORSION.name
 
     def __post_init__(self) -> None:
@@ -185,6 +195,10 @@ class Torsion(Extra):
             raise ModelError(f"two discs are called '{double}'; give each its own name")
         if len(self.discs) < 2 or len(self.sections) != len(self.discs) - 1:
             raise ModelError("a shaft that twists needs two discs at least, and a section from each to the next")
+        if self.parents and (
+            len(self.parents) != len(self.sections) or any(not 0 <= p <= k for k, p in enumerate(self.parents))
+        ):
+            raise ModelError("every section starts at an earlier disc; correct the parents of the discs")
         for absorber in self.absorbers:
             self.index(absorber.on)
 
@@ -199,6 +213,36 @@ class Torsion(Extra):
     def driven(self) -> int:
         """Index of the disc where the load takes its torque: the last where none is named."""
         return self.index(self.output) if self.output else len(self.discs) - 1
+
+    @cached_property
+    def links(self) -> tuple[tuple[int, int, float], ...]:
+        """Sections, then absorbers: index of the front disc, of the rear disc or ring, and speed ratio."""
+        parents, count = self.parents or range(len(self.sections)), len(self.discs)
+        sections = [(parent, k, self.discs[k].ratio) for k, parent in enumerate(parents, 1)]
+        carriers = [self.index(absorber.on) for absorber in self.absorbers]
+        return (*sections, *((disc, k, self.discs[disc].ratio) for k, disc in enumerate(carriers, count)))
+
+    @cached_property
+    def ratios(self) -> Array:
+        """Speeds of discs and rings over that of the crankshaft, shape (discs and rings,)."""
+        return np.array([*(disc.ratio for disc in self.discs), *(r for *_, r in self.links[len(self.sections) :])])
+
+    @cached_property
+    def incidence(self) -> Array:
+        """Matrix from angles at crank speed to twists of sections and absorbers, (links, discs and rings) (V16)."""
+        matrix = np.zeros((len(self.links), len(self.ratios)))
+        for row, (front, rear, ratio) in zip(matrix, self.links, strict=True):
+            row[front], row[rear] = ratio, -ratio
+        return matrix
+
+    @cached_property
+    def is_in_front(self) -> Mask:
+        """True where a disc is on the front side of a section, shape (sections, discs)."""
+        behind = np.eye(len(self.sections), len(self.discs), 1, dtype=bool)
+        for k, (front, *_) in reversed([*enumerate(self.links[: len(self.sections)])]):
+            if front:
+                behind[front - 1] |= behind[k]
+        return ~behind
 
     @property
     def numbers(self) -> dict[tuple[str, str], Any]:
@@ -240,7 +284,7 @@ class Torsion(Extra):
     def turning_inertia(self, parts: Sequence[SliderCrank], /) -> float:
         """Return the inertia of all discs without pistons and rods [kg m2] (V14); rings of absorbers slip."""
         swinging = sum(reduced_inertia(part) - part.rotating_mass * part.crank_radius**2 for part in parts)
-        return sum(disc.inertia for disc in self.discs) - swinging
+        return sum(disc.inertia * disc.ratio**2 for disc in self.discs) - swinging
 
     @property
     def labels(self) -> Sequence[str]:

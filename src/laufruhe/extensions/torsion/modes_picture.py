@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from laufruhe.extensions.torsion.channels import TORSIONAL_FREQUENCIES
 from laufruhe.extensions.torsion.facts import TorsionFacts, facts_of, is_twisted, speed_range
+from laufruhe.extensions.torsion.machine import Torsion
 from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.plots.speed_axis import LIMIT, limits_on, mark_points
 from laufruhe.plots.style import AFTER, GREEN, ORANGE, entry, entry_of_dots, finish_page, page, styled
@@ -32,8 +33,7 @@ def figure(result: Result) -> Figure:
     facts = facts_of(result.final, low, high)
     drawn = page(1, 2, (3.9, 3.6), gap=0.85)
     shapes, speeds = drawn.panels
-    names = [disc.name for disc in chain_of(result.final.engine).discs]
-    _shapes(shapes, facts, names)
+    _shapes(shapes, facts, chain_of(result.final.engine))
     _speeds(speeds, result, facts, high)
     count = min(MAX_MODES, len(facts.modes.frequencies))
     legend: list[Artist] = [
@@ -47,12 +47,18 @@ def figure(result: Result) -> Figure:
     return finish_page(drawn, result, "Torsional vibration of the crankshaft", text, legend)
 
 
-def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
+def _shapes(axes: Axes, facts: TorsionFacts, chain: Torsion) -> None:
+    names = [disc.name for disc in chain.discs]
     places = range(len(names))
     axes.axhline(0.0, color=FAINT, linewidth=0.7)
     for m in range(min(MAX_MODES, facts.modes.shapes.shape[1])):
-        axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
-    axes.set(ylim=(-1.1, 1.1), ylabel="angle, scaled to 1")
+        shape = facts.modes.shapes[:, m]
+        axes.plot(places, shape, "o", color=COLOURS[m], markersize=4.0)
+        # a branch is thinner, and starts at the disc that drives it
+        for front, rear, ratio in chain.links[: len(chain.sections)]:
+            width = 1.6 if ratio == 1.0 and rear == front + 1 else 0.8
+            axes.plot([front, rear], shape[[front, rear]], "-", color=COLOURS[m], linewidth=width)
+    axes.set(ylim=(-1.1, 1.1), ylabel="angle at crank speed, scaled to 1")
     step = -(-len(names) // MAX_NAMES)
     labels = [fit_line(name, 1.1) if k % step == 0 else "" for k, name in enumerate(names)]
     axes.set_xticks(list(places), labels, rotation=60, ha="right", rotation_mode="anchor")

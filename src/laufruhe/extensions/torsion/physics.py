@@ -1,12 +1,13 @@
-"""Torsional vibration of the crankshaft: natural modes, vector sums, and the steady twist of every section (V1-V12).
+"""Torsional vibration of the crankshaft: natural modes, vector sums, and the steady twist of every section (V1-V16).
 
 Discs on shafts without mass turn about their even speed by small angles q:
 
     J q'' + C q' + K q = T,        order by order   (K + i H + i h w C - (h w)^2 J) q_h = T_h      (V5)
 
 with the matrices of inertia J, damping C and stiffness K, the crank speed w, and the order h. T is the torque of gas,
-pistons and rods on each throw (T1), and H is what hysteresis adds to K. Chapter 2.9 of the textbook explains discs and
-shafts, half the reciprocating mass, critical speeds, main orders and stress.
+pistons and rods on each throw (T1), and H is what hysteresis adds to K. The angle q of a disc that turns n times as
+fast as the crank is its own angle over n, so that it counts with J n^2, and its shaft with k n^2 (V16). Chapter 2.9 of
+the textbook explains discs and shafts, half the reciprocating mass, critical speeds, main orders and stress.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class AtSpeed:
         return natural_modes(chain, self.speed).frequencies
 
     def inertia(self, chain: Torsion) -> Array:
-        """Return the inertia matrix of discs and rings [kg m2], which is diagonal."""
+        """Return the inertia matrix of discs and rings at crank speed [kg m2], which is diagonal."""
         return np.diag(inertias(chain))
 
     def inertia_ratio(self, absorber: Absorber) -> float | None:
@@ -75,8 +76,8 @@ class InOrder:
 
     def inertia(self, chain: Torsion) -> Array:
         """Return the inertia matrix [kg m2], with J - (n/h)^2 J for each pendulum between ring and disc (V15)."""
-        pulls = [(chain.index(a.on), k, complex(a.inertia * (a.order / self.order) ** 2)) for k, a in _rings(chain)]
-        return np.asarray(np.diag(inertias(chain)) - _linked(chain, pulls).real)
+        pulls = [complex(a.inertia * (a.order / self.order) ** 2) for a in chain.absorbers]
+        return np.asarray(np.diag(inertias(chain)) - _linked(chain, [0j] * len(chain.sections) + pulls).real)
 
     def inertia_ratio(self, absorber: Absorber) -> float | None:
         """Return the effective over the own inertia of an absorber: 1 (ring), 1 / (1 - h^2/n^2) (pendulum).
@@ -105,9 +106,9 @@ class TorsionalModes:
     frequencies
         Natural frequencies [Hz], shape (modes,).
     shapes
-        Angle of every disc, shape (discs, modes), the largest of each one.
+        Angle of every disc at crank speed (V16), shape (discs, modes), the largest of each one.
     rings
-        Angle of every absorber's ring, shape (absorbers, modes).
+        Angle of every absorber's ring at crank speed, shape (absorbers, modes).
     """
 
     frequencies: Array
@@ -132,13 +133,9 @@ def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalM
 
     `fixed` are the stiffnesses of the absorbers in these modes [N m/rad].
     """
-    ends = [(k, k + 1) for k in range(len(chain.sections))] + [(chain.index(a.on), k) for k, a in _rings(chain)]
     stiff = np.array([*(section.stiffness for section in chain.sections), *fixed])
-    twists = np.zeros((len(ends) + 1, len(inertia)))
-    for row, (a, b) in zip(twists, ends, strict=False):
-        row[a], row[b] = 1.0, -1.0
     # no torque from outside acts on the chain, so that its angular momentum is zero
-    twists[-1] = inertia.sum(axis=0)
+    twists = np.vstack([chain.incidence, inertia.sum(axis=0)])
     angles = np.linalg.inv(twists)[:, :-1]
     mass, has_stiffness = angles.T @ inertia @ angles, stiff > 0.0
     # a link without stiffness twists until it carries no torque
@@ -245,20 +242,19 @@ def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
     In order zero the load takes the torque at its own disc, and the sections from the driving disc to this one twist.
     An order on a natural frequency without damping raises `ModelError`.
     """
-    count, sections = len(chain.discs), np.arange(len(chain.sections))
-    flexibility = np.zeros((len(orders), len(sections), count), dtype=complex)
+    count, ratios = len(chain.discs), chain.ratios[1 : len(chain.discs)]
+    flexibility = np.zeros((len(orders), len(ratios), count), dtype=complex)
     is_mean = orders == 0.0
     # a section carries the torques in front of it, less that of the load if its disc is in front
-    through = np.arange(count)[None, :] <= sections[:, None]
-    leaves_shaft = (chain.driven <= sections)[:, None]
-    stiff = np.array([section.stiffness for section in chain.sections])
-    flexibility[is_mean] = (through * 1.0 - leaves_shaft) / stiff[:, None]
+    through = chain.is_in_front
+    stiff = np.array([section.stiffness for section in chain.sections]) * ratios
+    flexibility[is_mean] = (through * 1.0 - through[:, chain.driven, None]) / stiff[:, None]
     if np.all(is_mean):
         return flexibility
     size = count + len(chain.absorbers)
     drives = np.tile(np.eye(size, dtype=complex), (int(np.sum(~is_mean)), 1, 1))
     angles = _solved(chain, orders[~is_mean], speed, drives)[:, :count, :count]
-    flexibility[~is_mean] = angles[:, :-1] - angles[:, 1:]
+    flexibility[~is_mean] = _twists(chain, angles)
     return flexibility
 
 
@@ -271,11 +267,11 @@ def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArr
 
 
 def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the twist of each section, front end minus rear end, shape (n, sections) [rad] (V5)."""
+    """Return the twist of each section, front end minus rear end, shape (n, sections) [rad] (V5, V16)."""
     torques, chain = throw_torques(engine, point, fidelity), chain_of(engine)
     angles = _angles(chain, torques, point.speed)[:, : len(chain.discs)]
     mean = receptances(chain, torques.orders[:1], point.speed)[0] @ torques.coefficients[0]
-    return Spectrum(torques.base, np.concatenate([mean[None], angles[:, :-1] - angles[:, 1:]]))
+    return Spectrum(torques.base, np.concatenate([mean[None], _twists(chain, angles[:, :, None])[:, :, 0]]))
 
 
 def shaft_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -310,11 +306,12 @@ def stress_factors(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
 def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Array:
     """Return the mean power dissipated in each absorber, shape (absorbers,) [W] (V12)."""
     chain, torques = chain_of(engine), throw_torques(engine, point, fidelity)
-    orders, count = torques.orders[1:], len(chain.discs)
+    orders = torques.orders[1:]
     angles = _angles(chain, torques, point.speed)
     heat = []
     for k, absorber in enumerate(chain.absorbers):
-        swing = np.abs(angles[:, count + k] - angles[:, chain.index(absorber.on)]) ** 2
+        disc, ring, ratio = chain.links[len(chain.sections) + k]
+        swing = np.abs(ratio * (angles[:, ring] - angles[:, disc])) ** 2
         heat.append(0.5 * float(np.sum(absorber.losses(orders * point.speed, point.speed) * swing)))
     return np.array(heat)
 
@@ -325,14 +322,11 @@ def dynamic_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArr
     It is affine in inertia, stiffness and damping.
     """
     rate, discs = (orders * speed)[:, None, None], len(chain.discs)
-    springs = [(k, k + 1, s.stiffness * complex(1.0, s.loss_factor)) for k, s in enumerate(chain.sections)]
-    dampers = [(k, k + 1, complex(s.damping)) for k, s in enumerate(chain.sections)]
-    for ring, a in _rings(chain):
-        disc = chain.index(a.on)
-        springs.append((disc, ring, a.stiffness_at(speed) + 1j * a.stiffness * a.loss_factor))
-        dampers.append((disc, ring, complex(a.damping_at(speed))))
+    springs = [s.stiffness * complex(1.0, s.loss_factor) for s in chain.sections]
+    springs += [a.stiffness_at(speed) + 1j * a.stiffness * a.loss_factor for a in chain.absorbers]
+    dampers = [*(s.damping for s in chain.sections), *(a.damping_at(speed) for a in chain.absorbers)]
     damping = _linked(chain, dampers).real
-    damping[np.arange(discs), np.arange(discs)] += [disc.damping for disc in chain.discs]
+    damping[np.arange(discs), np.arange(discs)] += [disc.damping * disc.ratio**2 for disc in chain.discs]
     return np.asarray(_linked(chain, springs) + 1j * rate * damping - rate**2 * np.diag(inertias(chain)))
 
 
@@ -364,18 +358,22 @@ def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -
 
 
 def inertias(chain: Torsion) -> Array:
-    """Return the inertias of discs and rings, shape (discs and rings,) [kg m2]."""
-    return np.array([disc.inertia for disc in chain.discs] + [absorber.inertia for absorber in chain.absorbers])
+    """Return the inertias of discs and rings at crank speed, shape (discs and rings,) [kg m2] (V16)."""
+    of_parts = [*(disc.inertia for disc in chain.discs), *(absorber.inertia for absorber in chain.absorbers)]
+    return np.asarray(of_parts * chain.ratios**2)
 
 
-def _rings(chain: Torsion) -> list[tuple[int, Absorber]]:
-    return list(enumerate(chain.absorbers, len(chain.discs)))
+def _twists(chain: Torsion, angles: ComplexArray) -> ComplexArray:
+    front, rear, ratios = (np.array(column) for column in zip(*chain.links[: len(chain.sections)], strict=True))
+    return np.asarray(ratios[:, None] * (angles[:, front] - angles[:, rear]))
 
 
-def _linked(chain: Torsion, links: Sequence[tuple[int, int, complex]]) -> ComplexArray:
-    count = len(chain.discs) + len(chain.absorbers)
+def _linked(chain: Torsion, values: Sequence[complex]) -> ComplexArray:
+    """Return the matrix of springs or dampers at crank speed from their values, sections first (V16)."""
+    count = len(chain.ratios)
     matrix = np.zeros((count, count), dtype=complex)
-    for a, b, value in links:
+    for (a, b, ratio), constant in zip(chain.links, values, strict=True):
+        value = constant * ratio**2
         matrix[a, a] += value
         matrix[b, b] += value
         matrix[a, b] -= value

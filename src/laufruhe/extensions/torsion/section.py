@@ -44,7 +44,7 @@ def _modes(result: Result, facts: TorsionFacts) -> Table:
     rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in modes)
     omitted = len(facts.modes.frequencies) - len(modes)
     remark = f" {counted(omitted, 'higher mode')} in result.json." if omitted else ""
-    note = f"Undamped modes. Angle of every disc, scaled to 1 at the largest of each mode.{remark}"
+    note = f"Undamped modes. Angle of every disc at crank speed, scaled to 1 at the largest of each mode.{remark}"
     return Table(
         ("mode", "Hz", *names), rows, title="Natural modes of the crankshaft", note=note, file="crankshaft-modes"
     )
@@ -85,7 +85,7 @@ def _record(result: Result) -> Mapping[str, Any]:
     facts = facts_of(design, *reach)
     heat = [absorber_heat(design.engine, point, problem.fidelity) for point in problem.points]
     return {
-        "discs": [{"name": disc.name, "inertia": disc.inertia} for disc in chain.discs],
+        "discs": [{"name": disc.name, "inertia": disc.inertia, "ratio": disc.ratio} for disc in chain.discs],
         "sections": [{"name": section.name, "stiffness": section.stiffness} for section in chain.sections],
         "frequencies": facts.modes.frequencies.tolist(),
         "shapes": facts.modes.shapes.T.tolist(),
