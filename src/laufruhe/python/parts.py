@@ -651,7 +651,7 @@ class EngineParts(Parts):
         self, *, throw_inertia: Value | Values, cylinder_damping: Value | Values | None = None,
         loss_factor: Value | None = None, shear_modulus: Value | None = None, speeds: Values | None = None,
         output: str | None = None, crank: Table | None = None, discs: Sequence[Table] | None = None,
-        absorbers: Sequence[Table] | None = None,
+        branches: Sequence[Table] | None = None, absorbers: Sequence[Table] | None = None,
     ) -> Self:
         """Return the engine with torsion.
 
@@ -675,6 +675,8 @@ class EngineParts(Parts):
             The shaft from throw to throw.
         discs
             Discs before and behind the throws, from the front.
+        branches
+            Shaft that gears, a belt or a chain drive from a disc: a camshaft, pump, propeller or generator.
         absorbers
             A viscous or rubber damper, or a pendulum.
         """

@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from laufruhe import plots
 from laufruhe.live import live_model
 from laufruhe.numerics.budget import stoppable
 from laufruhe.present.pictures import PICTURES
@@ -16,14 +15,13 @@ from laufruhe.problem.problem import Problem
 from laufruhe.python.watch import Callback, Progress, Watch
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
-from laufruhe.report.result_report import result_document
-from laufruhe.report.web_page import as_html
 from laufruhe.solvers import result as solved
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# matplotlib is imported for the first picture
 class Pictures:
     """Pictures of a result: `result.plot.polar()`, or `result.plot("polar")`."""
 
@@ -32,6 +30,8 @@ class Pictures:
 
     def __call__(self, name: str) -> Figure:
         """Return a picture by name, as a figure of matplotlib."""
+        from laufruhe import plots
+
         return plots.figure(self._result, name)
 
     def __getattr__(self, name: str) -> Callable[[], Figure]:
@@ -40,6 +40,8 @@ class Pictures:
         return partial(self, name if name in PICTURES else name.replace("_", "-"))
 
     def __iter__(self) -> Iterator[str]:
+        from laufruhe import plots
+
         return iter(plots.names(self._result))
 
     def __dir__(self) -> list[str]:
@@ -72,6 +74,10 @@ class Result(solved.Result):
 
     def report(self, path: str | Path) -> None:
         """Write the report with its pictures: a page if the path ends in .html, or Markdown with pictures beside it."""
+        from laufruhe import plots
+        from laufruhe.report.result_report import result_document
+        from laufruhe.report.web_page import as_html
+
         place = Path(path)
         document = result_document(self, list(PICTURES), "laufruhe in Python")
         is_page = place.suffix in (".html", ".htm")

@@ -99,6 +99,48 @@ def bolts(
     return keys_of(locals())
 
 
+def branch_disc(
+    name: str, *, inertia: Value, shaft: Table, damping: Value | None = None,
+) -> Table:
+    """Return a table `branch_disc`.
+
+    A disc of a branch.
+
+    Parameters
+    ----------
+    name
+        Name in tables, pictures and messages.
+    inertia
+        Moment of inertia about the axis of rotation [kg m^2].
+    shaft
+        Shaft from this disc to the next one towards the throws.
+    damping
+        Viscous damping against the block [N m s/rad].
+    """
+    return keys_of(locals())
+
+
+def branch(
+    *, on: str, ratio: Number, gear_inertia: Value | None = None, discs: Sequence[Table] | None = None,
+) -> Table:
+    """Return a table `branch`.
+
+    Shaft that gears, a belt or a chain drive from a disc: a camshaft, pump, propeller or generator.
+
+    Parameters
+    ----------
+    on
+        Name of the disc that drives it: of the crankshaft, or of a branch before it.
+    ratio
+        Speed over that of this disc; negative runs against it.
+    gear_inertia
+        Inertia of its gear, which follows the disc without twist, at the speed of the branch [kg m^2].
+    discs
+        Discs of the branch, from its gear.
+    """
+    return keys_of(locals())
+
+
 def chamber(
     name: str | None = None, *, end: Literal["head", "crank"], bore: Value, cylinders: Sequence[int] | None = None,
     rod: Value | None = None, steam: Table | None = None, pump: Table | None = None, trace: Table | None = None,
@@ -173,7 +215,7 @@ def crank(
 
 
 def disc(
-    name: str, *, end: Literal["front", "rear"], inertia: Value, shaft: Table, damping: Value | None = None,
+    name: str, *, inertia: Value, shaft: Table, end: Literal["front", "rear"], damping: Value | None = None,
 ) -> Table:
     """Return a table `disc`.
 
@@ -183,12 +225,12 @@ def disc(
     ----------
     name
         Name in tables, pictures and messages.
-    end
-        Whether the disc stands before the first throw or behind the last.
     inertia
         Moment of inertia about the axis of rotation [kg m^2].
     shaft
         Shaft from this disc to the next one towards the throws.
+    end
+        Whether the disc stands before the first throw or behind the last.
     damping
         Viscous damping against the block [N m s/rad].
     """

@@ -214,7 +214,6 @@ def test_two_designs_stand_side_by_side(shown: Page) -> None:
 def test_the_front_fills_in_and_a_point_is_a_design(shown: Page) -> None:
     shown.locator("#across").select_option("balancer mass")
     shown.locator("#draw").click()
-    shown.locator("#front circle").nth(6).wait_for()
     expect(shown.locator("#front-state")).to_contain_text("done")
     assert shown.locator("#front circle").count() >= 20
     point = shown.locator("#front circle").nth(10)

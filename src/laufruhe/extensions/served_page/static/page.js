@@ -157,6 +157,7 @@ async function settled(answer) {
   const isOther = JSON.stringify(answer.holds) !== JSON.stringify(state.held);
   if (answer.design && isOther) {
     state.held = answer.holds;
+    trade.withdraw();
     const mine = state.position;
     const model = await ask("follow", asked());
     if (mine !== state.position) return;

@@ -15,6 +15,8 @@ export class Trade {
   /** @param {string[]} names of other measures */
   offer(names) {
     const select = byId("across");
+    // a front in the making stays: it is cleared when settings change
+    if (names.join("\n") === [...select.options].map((option) => option.value).join("\n")) return;
     const before = select.value;
     byId("trade").hidden = !names.length;
     select.replaceChildren(...names.map((name) => element("option", { value: name }, name)));
