@@ -21,7 +21,7 @@ from laufruhe.errors import ModelError
 GROUP = "laufruhe.extensions"
 Tables = Literal[
     "norms", "channels", "kinds", "layouts", "drives", "methods", "quantities", "provers", "reductions", "study_kinds",
-    "commands", "keys", "weight_keys", "notes", "pictures", "sections",
+    "commands", "keys", "notes", "pictures", "sections",
 ]  # fmt: skip
 
 
@@ -60,8 +60,6 @@ class Extension:
         Objects of `typer.models.CommandInfo`; `laufruhe --help` imports their modules, so these should import little.
     keys
         Objects of `laufruhe.files.problem_file.Key`: tables of a problem file.
-    weight_keys
-        Objects of `laufruhe.files.problem_file.WeightKey`: keys of counterweights and of unbalances of shafts.
     notes
         Objects of `laufruhe.files.problem_file.Note`: notes that a file may add to any number, such as tolerances.
     sections
@@ -84,7 +82,6 @@ class Extension:
     study_kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()
-    weight_keys: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     sections: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
@@ -105,9 +102,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "assembly": "robust",
         "run_up": "run_ups",
         "running_gear": "sizes",
-        "crankcase": "workshop",
     },
-    "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "layouts": {"rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke"},

@@ -7,6 +7,7 @@ import re
 import shlex
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -55,67 +56,113 @@ def test_init_leaves_what_is_there(here: Path) -> None:
     assert [path.name for path in here.iterdir()] == ["problem.toml"]
 
 
-def test_init_with_nobody_to_ask_says_what_to_do(here: Path) -> None:
-    found = run.invoke(app, ["init"])
-    assert (found.exit_code, list(here.iterdir())) == (2, [])
-    assert "add --from" in found.output
-
-
-@pytest.mark.parametrize(
-    ("typed", "cylinders"),
-    [
-        ("\nMy four\n\n\n\n\n\n\n\n\n\n", 4),
-        ("\nMy twin\nvee\n\n2\n60\n\n\n\n\n\n\n0.4 kg\n", 2),
-        ("\nMy six\nvee\n\n6\n60\n60\none bank after the other\nleft\n1-6-3-5-2-4\n\n\n\n\n\n", 6),
-        ("\nMy single\n\n\n1\n\n\n\n\n", 1),
-        # two cylinders on one throw have no neighbours
-        ("\nMy two\nboxer\n\n2\n\n\n\n1-2\n\n\n0.3\n0.4 kg\n", 2),
-        ("\nMy ten\nvee\n\n10\n\n\n\nleft\n-\n0, 144, 216, 288, 72\n-\n\n\n\n\n\n", 10),
-    ],
-)
-def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cylinders: int) -> None:
-    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
+@pytest.mark.parametrize("typed", ["", "\nMine\n"])
+def test_init_without_all_answers_says_what_to_do(here: Path, typed: str) -> None:
     found = run.invoke(app, ["init"], input=typed)
-    assert found.exit_code == 0, found.output
-    assert len(load(here / "problem.toml").engine.cylinders) == cylinders
+    assert (found.exit_code, list(here.iterdir())) == (2, [])
+    assert "has no answer, because the input ended; answer it, or add --from" in found.stderr
+
+
+def answered(*answers: str) -> str:
+    """Return what is typed: no source, a title, then these answers and the default ones."""
+    return "\n".join(["", "Mine", *answers, *[""] * 30])
 
 
 @pytest.mark.parametrize(
-    ("typed", "said", "count"),
+    ("answers", "keys"),
     [
-        # an odd number of cylinders in two banks, then an even one
-        ("\n\nboxer\n\n5\n4\n\n\n\n\n\n\n\n\n\n", "is no multiple of the 2 banks", 4),
-        # no even firing of ten cylinders at 90 degrees, nothing in its place, then throws and an order that they allow
-        ("\n\nvee\n\n10\n\n\n\nleft\n1-10-5-7-2-8-3-9-4-6\n\n\n45,117,333,189,261\n1-2-3-4-5-6-7-8-9-10\n\n\n\n\n\n\n",
-         "cannot be even: cylinders 1 and 6", 10),
-        ("\n\nw\n\n\n\n\n\n\n\n\n\n", "is none of these; use one of", 4),
-        ("bmw-b49\n\n\n\n\n\n\n\n\n\n\n\n", "did you mean 'bmw-b48'?", 4),
-        ("\n\n\n\nfive\n3\n1-2\n\n\n\n\n\n\n", "must be a whole number", 3),
-        ("\n\n\n\n\n\n\n\n1,5 mm\n\n1.2\n\n\n", 'write "1.5 mm"', 4),
-        ("\n\n\n\n\n\n\n\n\n1.2\n\n\n", "blocks the crank", 4),
+        ([], {"layout": "inline", "cylinders": 4, "firing_order": [1, 3, 4, 2]}),
+        (["single", "2"], {"cycle": "two-stroke", "cylinders": 1}),
+        (["270 twin"], {"firing_intervals": [270, 450], "firing_order": [1, 2]}),
+        (["twin", "", "", "180"], {"firing_intervals": [180, 540]}),
+        (["twin", "", "", "even"], {"firing_intervals": None, "firing_order": [1, 2]}),
+        (["60° V2"], {"layout": "vee", "bank_angle": 60, "cylinders": 2}),
+        (["flat four", "", "", "", "", "1-3-2-4"], {"layout": "boxer", "firing_order": [1, 3, 2, 4]}),
+        (["V6", "", "", "60", "60", "by bank", "links", "", "163524"],
+         {"split_pin_angle": 60, "first_bank": "left", "firing_order": [1, 6, 3, 5, 2, 4]}),
+        (["V10", "", "", "", "", "", "left", "", "-", "0, 144, 216, 288, 72", "-"],
+         {"cylinders": 10, "throws": [0, 144, 216, 288, 72], "firing_order": None}),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_and_asked_again(
-    here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, said: str, count: int
-) -> None:
-    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
-    found = run.invoke(app, ["init"], input=typed)
+def test_init_asks(here: Path, answers: list[str], keys: dict[str, object]) -> None:
+    found = run.invoke(app, ["init"], input=answered(*answers))
+    assert found.exit_code == 0, found.output
+    assert load(here / "problem.toml").objective
+    engine = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))["engine"]
+    assert {key: engine.get(key) for key in keys} == keys
+
+
+FOUR = ["", "", "", "", "", "1-3-4-2"]
+"""Answers about an inline four, before its sizes."""
+
+
+@pytest.mark.parametrize(
+    ("answers", "said", "key", "value"),
+    [
+        # an odd number of cylinders in two banks, then an even one
+        (["boxer", "", "5", "4"], "is no multiple of the 2 banks", "cylinders", 4),
+        # no even firing of ten cylinders at 90 degrees, nothing in its place, then throws and an order that they allow
+        (["V10", *[""] * 5, "left", "", "1-10-5-7-2-8-3-9-4-6", "", "45,117,333,189,261", "1-2-3-4-5-6-7-8-9-10"],
+         "cannot be even: cylinders 1 and 6", "throws", [45, 117, 333, 189, 261]),
+        (["w", ""], "is no layout; use inline, vee or boxer, or a name such as V8", "layout", "inline"),
+        (["", "6", "four"], "is none of these; use one of", "cycle", "four-stroke"),
+        (["", "", "five", "3", "", "", "1-2", "1-2-3"], "must be a whole number", "cylinders", 3),
+        (["twin", "", "", "270-270", "270"], "does not divide the 720 deg of a cycle into 2 intervals; write even, or",
+         "firing_intervals", [270, 450]),
+        ([*FOUR, "80", "81 mm"], 'write for example "120 mm"', "bore", "81 mm"),
+        ([*FOUR, "1,5 mm", "82 mm"], 'write "1.5 mm"', "bore", "82 mm"),
+        ([*FOUR, "", "", "", "1.2", "1:4"], "is no usual ratio", "rod_ratio", 0.25),
+        ([*FOUR, "", "", "", "30 mm", "140 mm"], "blocks the crank", "rod_length", "140 mm"),
+        ([*FOUR, "", "", "", "", "0.4 kg", "0.6 kg", "0.7 kg", "25 %"], "is not between zero and the 0.6 kg of the rod",
+         "reciprocating_mass", "0.55 kg"),
+        ([*FOUR, "", "", "", "", "", "", "", "", "", "", "10 bar", "60 bar"], "for example 60 bar", "bore", "80 mm"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_and_asked_again(here: Path, answers: list[str], said: str, key: str, value: object) -> None:
+    found = run.invoke(app, ["init"], input=answered(*answers))
     assert found.exit_code == 0, found.output
     assert said in found.output
     assert "draft" not in found.output
-    assert len(load(here / "problem.toml").engine.cylinders) == count
+    assert tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))["engine"][key] == value
 
 
-def test_nothing_is_asked_for_a_file_that_is_there(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
+def test_a_wrong_source_is_asked_again(here: Path) -> None:
+    found = run.invoke(app, ["init"], input="bmw-b49\n" + answered())
+    assert (found.exit_code, "did you mean 'bmw-b48'?" in found.output) == (0, True)
+
+
+def test_petrol_and_diesel_have_pressures_of_their_own(here: Path) -> None:
+    peaks, masses = [], []
+    for fuel in ("benzin", "diesel"):
+        assert run.invoke(app, ["init", f"{fuel}.toml"], input=answered("", "", "", fuel)).exit_code == 0
+        tables = tomllib.loads((here / f"{fuel}.toml").read_text(encoding="utf-8"))
+        peaks.append(tables["gas"]["peak_pressure"])
+        masses.append(float(tables["engine"]["reciprocating_mass"].removesuffix(" kg")))
+        assert "compression ratio" in tables["assumptions"][0]
+    assert peaks == ["60 bar", "140 bar"]
+    assert masses[0] < masses[1]
+
+
+@pytest.mark.parametrize(
+    ("answers", "ratios"),
+    # a force or couple of first order that turns against the crank needs a shaft that does so, others counterweights
+    [(["single"], [-1]), (["twin", "", "", "even"], [-1]), (["270 twin"], [-1]), (["V2"], [2, -2]), ([], [2, -2])],
+)
+def test_balancer_shafts_turn_as_the_free_loads(here: Path, answers: list[str], ratios: list[int]) -> None:
+    assert run.invoke(app, ["init"], input=answered(*answers)).exit_code == 0
+    tables = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))
+    assert [shaft["ratio"] for shaft in tables.get("balancer_shafts", [])] == ratios
+
+
+def test_nothing_is_asked_for_a_file_that_is_there(here: Path) -> None:
     (here / "problem.toml").write_text("mine", encoding="utf-8")
     found = run.invoke(app, ["init"])
     assert (found.exit_code, found.output.count("\n")) == (2, 1)
 
 
 def test_ctrl_c_at_a_question_ends_as_everywhere(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
-    # an end of what is typed is told in the same way
+    # an end of what is typed at a terminal is told in the same way
+    monkeypatch.setattr("laufruhe.cli.questions.sys", SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True)))
     found = run.invoke(app, ["init"], input="\n")
     assert found.exit_code == 130
     assert found.stderr == "\nlaufruhe: interrupted, nothing was written\n"

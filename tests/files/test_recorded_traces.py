@@ -26,7 +26,7 @@ from laufruhe.files import number_tables
 from laufruhe.files.number_tables import Unit, number_table, unit_in
 from laufruhe.files.reader import load
 from laufruhe.machine import PressureTrace
-from laufruhe.physics.recorded_gas import GasFacts, gas_facts
+from laufruhe.physics.gas_facts import GasFacts, gas_facts
 from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
 from laufruhe.problem.problem import Problem
 from recorded_cycle import BORE, DEGREES, ROD, STROKE, cycle_pressure, mean_torque
@@ -544,7 +544,7 @@ def test_check_solve_and_json_say_how_the_file_was_read(tmp_path: Path) -> None:
     solved = run("solve", path, "--out", tmp_path / "out", "--json", tmp_path / "r.json")
     assert solved.exit_code == 0, solved.output
     for text in (solved.output, (tmp_path / "out" / "report.md").read_text(encoding="utf-8")):
-        assert "Recorded gas pressure" in text
+        assert "Gas pressure" in text
         assert "Of 8 cycles" in " ".join(text.split())
     (head, row) = (tmp_path / "out" / "gas-pressure.csv").read_text(encoding="utf-8").splitlines()
     assert head.split(",")[:4] == ["at", "peak [bar]", "peak at [deg]", "imep [bar]"]

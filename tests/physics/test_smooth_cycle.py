@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from lanes import first_fast
 from laufruhe.machine import Cycle, Engine, OperatingPoint, PressureTrace, SliderCrank
 from laufruhe.numerics.spectrum import spectrum_with_kinks
+from laufruhe.physics.gas_facts import gas_facts
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.pressure_trace import _low_pass, _noise, smooth_cycle
-from laufruhe.physics.recorded_gas import gas_facts
 from laufruhe.physics.torque import torque_parts
 from recorded_cycle import AREA, BORE, CRANK, ROD, cycle_pressure, lever, mean_torque
 

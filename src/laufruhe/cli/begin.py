@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -31,24 +30,14 @@ def write_draft(file: Path, name: str | None) -> str:
         copies = ready.copies([source]).items()
         texts = {file.name if copy_name == entry.path.name else copy_name: text for copy_name, text in copies}
     else:
-        draft = drafts.draft_of_table(*ask_engine(), file) if source is None else drafts.draft_of_engine(source)
+        draft = drafts.draft_of_tables(ask_engine(), file) if source is None else drafts.draft_of_engine(source)
         texts = {file.name: draft, **dict([ready.schema_file()])}
     _write({file.parent / copy_name: text for copy_name, text in texts.items()})
     return f"{printed(str(file))}: ready to be changed; then: {typed('laufruhe', command, str(file))}\n"
 
 
-def _someone_answers() -> bool:
-    return sys.stdin.isatty()
-
-
 def _requested_source(file: Path) -> str | None:
     # an engine that the user describes has no source
-    if not _someone_answers():
-        rule, remedy = (
-            "asks questions, but the input is no terminal that could answer them",
-            "add --from with an engine or a ready problem",
-        )
-        raise refused("init", "", rule, remedy)
     if file.exists():
         raise refused("file", str(file), *_TAKEN)
     typer.echo("An engine of the catalogue (laufruhe engines), a ready problem (laufruhe examples),")

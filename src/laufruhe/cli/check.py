@@ -11,7 +11,7 @@ from pathlib import Path
 from laufruhe.cli.screen import complain, is_quiet
 from laufruhe.errors import printed
 from laufruhe.files.reader import load
-from laufruhe.present.recorded_gas import gas_lines
+from laufruhe.present.gas_figures import gas_lines
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem

@@ -27,7 +27,6 @@ Loc: TypeAlias = tuple[str | int, ...]
 MAX_COMPLAINTS = 20
 """Largest number of complaints about a file at once."""
 _CLOSE = 0.6
-_WEIGHTS = ("counterweights", "balancer_shafts")
 _MAX_NAMED = 3
 _TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
 """Kinds of extension objects by the keys of a file that name such an object."""
@@ -147,11 +146,9 @@ def nearest_file(path: Path, otherwise: str) -> str:
 
 def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: type[BaseModel]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
+    if kind == "extra_forbidden" and len(loc) == 1 and loc[0] in HOMES["keys"]:
+        return Complaint(where, "", *missing_extension(HOMES["keys"][str(loc[0])]))
     if kind == "extra_forbidden":
-        of_table: Mapping[str, str] = HOMES["weight_keys"] if loc[0] in _WEIGHTS else {}
-        extension_homes = HOMES["keys"] if len(loc) == 1 else of_table
-        if str(loc[-1]) in extension_homes:
-            return Complaint(where, "", *missing_extension(extension_homes[str(loc[-1])]))
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
         homes = _homes(str(loc[-1]), model)
         remedy = nearest(str(loc[-1]), keys, f"it stands in {' or '.join(homes)}" if homes else "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from laufruhe import units
 from laufruhe.files.catalogue import engine_named
 from laufruhe.files.reader import load_tables
 from laufruhe.files.ready import schema_line
-from laufruhe.files.toml_text import toml_value
+from laufruhe.files.toml_text import toml_text, toml_value
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -24,6 +24,12 @@ _OVERHANG = 0.1
 # smallest fraction of one cylinder's force, or of its moment about the middle, at which balancing an order pays
 _WORTH = 0.02
 _FORCE, _COUPLE = slice(3), slice(4, 6)
+_GAS = """\
+# [gas]                         # pressure on the pistons; it acts on the roll moment alone
+# model = "seiliger"
+# imep = "9 bar"                # indicated mean effective pressure
+# peak_pressure = "70 bar"
+"""
 _HEAD = """\
 {schema}
 # Numbers with a dimension are text with a unit: "120 mm", "1.25 kg", "2500 rpm"; bare ones are degrees or plain.
@@ -35,10 +41,7 @@ title = {title}
 [[operating_points]]            # several may follow, each with a name and a weight
 speed = "{speed}"
 
-# [gas]                         # pressure on the pistons; it acts on the roll moment alone
-# model = "seiliger"
-# imep = "9 bar"                # indicated mean effective pressure
-# peak_pressure = "70 bar"
+{gas}
 
 [mounts]                        # assumed: put yours here; x forward from the middle of the crank, y left, z up
 names = ["front left", "front right", "rear left", "rear right"]
@@ -72,10 +75,13 @@ def draft_of_engine(name: str) -> str:
     return _draft(entry.name, table, engine_of_table(entry.name, entry.engine, Path(name)))
 
 
-def draft_of_table(title: str, engine: Mapping[str, Any], path: Path) -> str:
-    """Return the text of a draft for an [engine] table; raise `InputError` for the file if the engine cannot exist."""
-    lines = "\n".join(f"{key} = {toml_value(value)}" for key, value in engine.items())
-    return _draft(title, f"\n[engine]\n{lines}\n", engine_of_table(title, engine, path))
+def draft_of_tables(tables: Mapping[str, Any], path: Path) -> str:
+    """Return the text of a draft with these tables; raise `InputError` for the file if the engine cannot exist."""
+    (point,) = tables["operating_points"]
+    head = {key: tables[key] for key in ("assumptions", "engine") if key in tables}
+    gas = toml_text({"gas": tables["gas"]}) if "gas" in tables else _GAS
+    engine = load_tables(tables, path).engine
+    return _draft(tables["title"], f"{toml_text(head)}", engine, point["speed"], gas)
 
 
 def engine_of_table(title: str, engine: Mapping[str, Any], path: Path) -> Engine:
@@ -84,50 +90,58 @@ def engine_of_table(title: str, engine: Mapping[str, Any], path: Path) -> Engine
     return load_tables(tables, path).engine
 
 
-def _draft(title: str, engine: str, built_engine: Engine) -> str:
+def _draft(title: str, engine: str, built_engine: Engine, speed: str = SPEED, gas: str = _GAS) -> str:
     half = max(abs(part.x) for part in built_engine.slider_cranks) + _OVERHANG
     places = [(x, y) for x in (half, -half) for y in (_ASIDE, -_ASIDE)]
     mounts = "\n".join(f'    ["{1e3 * x:g} mm", "{1e3 * y:g} mm", "0 mm"],' for x, y in places)
-    balance = _balance(built_engine)
     return _HEAD.format(
-        schema=schema_line(), title=toml_value(title), engine=engine, speed=SPEED, mounts=mounts, balance=balance
-    )
+        schema=schema_line(), title=toml_value(title), engine=engine, speed=speed, gas=gas.rstrip(), mounts=mounts,
+        balance=_balance(built_engine, speed),
+    )  # fmt: skip
 
 
-def _balance(engine: Engine) -> str:
+def _balance(engine: Engine, speed_text: str) -> str:
     """Return the lines with counterweights and balancer shafts that may balance free forces and couples.
 
     Free forces and couples are those of first and second order without the roll moment. Small ones get no
-    counterweight or balancer shaft.
+    counterweight or balancer shaft. What turns with the crank gets counterweights, what turns against it a shaft.
     """
-    parts, speed = engine.slider_cranks, units.parse(SPEED, "rad/s")
-    wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))
-    moments = [part.reciprocating_mass * part.crank_radius for part in parts]
+    parts, speed = engine.slider_cranks, units.parse(speed_text, "rad/s")
+    wrench = shaking_loads(engine, OperatingPoint(speed_text, speed))
+    moments = [(part.reciprocating_mass + part.rotating_mass) * part.crank_radius for part in parts]
     half, moment = max(abs(part.x) for part in parts), sum(moments)
     scales = np.array([1.0, half or 0.1]) * max(moments) * speed**2
     loads = [np.array([order_amplitude(wrench.at(order)[axes]) for axes in (_FORCE, _COUPLE)]) for order in (1, 2)]
+    # half the amplitude that turns against the crank (C4); a couple about y and z turns as a force along z and -y
+    first = wrench.at(1)
+    against = 0.5 * np.abs([first[2] - 1j * first[1], first[4] + 1j * first[5]])
     is_large = [bool(np.any(load > _WORTH * scales)) for load in loads]
     free = [np.where(load < 1e-9 * scales, 0.0, load) for load in loads]
     texts = (f"order {order}: force {load[0]:.4g} N, couple {load[1]:.4g} N m" for order, load in enumerate(free, 1))
-    lines = [f"# Free at {SPEED}: {'; '.join(texts)}."]
+    lines = [f"# Free at {speed_text}: {'; '.join(texts)}."]
     if is_large[0]:
         lines += _webs(half, moment)
-    if is_large[1]:
-        ratio = max(part.rod_ratio for part in parts)
+    ratio = max(part.rod_ratio for part in parts)
+    places = (("front", half), ("rear", -half)) if half else (("middle", 0.0),)
+    if np.any(against > _WORTH * scales):
+        lines += ["# a shaft at crank speed, against the crank"]
+        lines += _shaft("balancer", -1, 100, 0, places, 0.5 * moment)
+    elif is_large[1]:
         lines += ["# two shafts at twice crank speed, against each other"]
-        for name, speed, y in (("left", 2, 100), ("right", -2, -100)):
-            lines += [
-                "[[balancer_shafts]]", f'name = "{name}"', f"ratio = {speed}",
-                f'position = ["{y} mm", "-100 mm"]   # y, z',
-            ]  # fmt: skip
-            for place, x in (("front", half), ("rear", -half)) if half else (("middle", 0.0),):
-                named = [f'name = "{place}"', f'x = "{1e3 * x:g} mm"']
-                lines += ["[[balancer_shafts.unbalances]]", *named, *_open(0.25 * ratio * moment)]
-            lines.append("")
+        for name, turns, y in (("left", 2, 100), ("right", -2, -100)):
+            lines += _shaft(name, turns, y, -100, places, 0.25 * ratio * moment)
     if not any(is_large):
         lines += ["# Nothing of first or second order is left to balance; weights are shown as an example."]
         lines += _webs(half, moment)
     return "\n".join(lines) + "\n"
+
+
+def _shaft(name: str, ratio: int, y: int, z: int, places: Sequence[tuple[str, float]], moment: float) -> list[str]:
+    lines = ["[[balancer_shafts]]", f'name = "{name}"', f"ratio = {ratio}"]
+    lines += [f'position = ["{y} mm", "{z} mm"]   # y, z']
+    for place, x in places:
+        lines += ["[[balancer_shafts.unbalances]]", f'name = "{place}"', f'x = "{1e3 * x:g} mm"', *_open(moment)]
+    return [*lines, ""]
 
 
 def _webs(half: float, moment: float) -> list[str]:

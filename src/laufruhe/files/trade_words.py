@@ -1,4 +1,4 @@
-"""Words of the trade, and the keys of problem files that they mean."""
+"""Words of the trade, and the keys and values of problem files that they mean."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ import tomllib
 from collections import defaultdict
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 _FILE = Path(__file__).with_name("trade_words.toml")
 _LETTERS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "é": "e"})
 
 
 @cache
+def _tables() -> dict[str, Any]:
+    return tomllib.loads(_FILE.read_text(encoding="utf-8"))
+
+
+@cache
 def trade_words() -> tuple[tuple[str, str, str], ...]:
     """Return words of the trade, each with its key and a note on what the key is."""
-    entries = tomllib.loads(_FILE.read_text(encoding="utf-8"))["meanings"]
+    entries = _tables()["meanings"]
     return tuple((word, entry["key"], entry["note"]) for entry in entries for word in entry["words"].split(", "))
 
 
@@ -34,3 +40,14 @@ def _plain(word: str) -> str:
 def meanings(word: str) -> list[tuple[str, str]]:
     """Return the keys that a word of the trade means, each with a note on what it is; empty for other words."""
     return _by_word().get(_plain(word), [])
+
+
+@cache
+def _values() -> dict[tuple[str, str], str]:
+    words = ((entry, word) for entry in _tables()["values"] for word in (entry["value"], *entry["words"].split(", ")))
+    return {(entry["key"], _plain(word)): entry["value"] for entry, word in words}
+
+
+def trade_value(key: str, word: str) -> str | None:
+    """Return the value of a key that a word of the trade means; None for other words."""
+    return _values().get((key, _plain(word)))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
-from laufruhe.errors import Complaint
-from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.errors import Complaint, ModelError
+from laufruhe.machine import Engine, OperatingPoint, PressureTrace
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.exact_angles import as_turn, reduced_turn
-from laufruhe.physics.recorded_gas import gas_facts
+from laufruhe.physics.gas_facts import gas_facts
 from laufruhe.units import quantity_text
 
 FASTEST = 30.0
@@ -129,15 +130,20 @@ def _of_firing(engine: Engine) -> Iterator[Complaint]:
 
 def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
     for point in points:
-        facts = gas_facts(engine, point)
+        facts = None
+        with suppress(ModelError):
+            # the evaluation reports a cycle that cannot be met
+            facts = gas_facts(engine, point)
         if facts is None:
             continue
+        is_trace = isinstance(point.gas, PressureTrace)
         peak = quantity_text(1e-5 * facts.peak_pressure, "bar")
         if facts.peak_pressure > MAX_PEAK:
             rule = "is more than 300 bar; diesel engines reach 250 bar"
             unit = "kPa" if facts.peak_pressure < MAX_KILOPASCAL else "Pa"
-            yield Complaint("peak pressure of the gas", peak, rule, f"check pressure_unit; it may be {unit}")
-        if facts.least_pressure < MIN_GAS:
+            remedy = f"check pressure_unit; it may be {unit}" if is_trace else "check its unit"
+            yield Complaint("peak pressure of the gas", peak, rule, remedy)
+        if is_trace and facts.least_pressure < MIN_GAS:
             lowest = quantity_text(1e-5 * facts.least_pressure, "bar")
             rule = "is nearly a vacuum"
             yield Complaint(
@@ -149,7 +155,9 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
         half_turns = 180.0 * round(angle / 180.0)
         change = f"{abs(half_turns):g} deg {'less' if half_turns > 0.0 else 'more'}"
         check = f"check angle_zero; {change} would move the peak to {angle - half_turns:.4g} deg"
-        if facts.imep < -_ROUNDING * facts.peak_pressure:
+        if not is_trace and lies_late:
+            yield Complaint("peak of the gas", "", place, "check start and duration")
+        elif is_trace and facts.imep < -_ROUNDING * facts.peak_pressure:
             rule = f"is {quantity_text(facts.torque, 'N m')}, so the gas takes work" + f", and {place}" * lies_late
             remedy = check if lies_late and half_turns else "check angle_zero, unless the engine was motored"
             yield Complaint("mean torque of the gas", "", rule, remedy)
@@ -158,4 +166,5 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
         if facts.power > MAX_POWER * facts.displacement:
             power = quantity_text(1e-3 * facts.power, "kW")
             rule = f"is {1e-6 * facts.power / facts.displacement:.3g} kW for each litre; racing engines reach 230 kW"
-            yield Complaint("power of the gas", power, rule, "check pressure_unit, bore, stroke and speed")
+            pressure = "pressure_unit" if is_trace else "imep"
+            yield Complaint("power of the gas", power, rule, f"check {pressure}, bore, stroke and speed")

@@ -13,8 +13,8 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.balance_factor import balance_factors
+from laufruhe.physics.gas_facts import gas_facts
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.physics.recorded_gas import gas_facts
 from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.physics.static_cases import settled
 from laufruhe.physics.torque import torque_facts

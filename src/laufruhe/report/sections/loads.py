@@ -7,6 +7,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_forces import CycleMeasures
 from laufruhe.physics.torque import TorqueFacts, torque_facts
+from laufruhe.present.gas_figures import HEAD, gas_note, gas_rows
 from laufruhe.present.measures import (
     Places,
     evaluations_with_loads,
@@ -21,7 +22,6 @@ from laufruhe.present.measures import (
     uses_torque,
 )
 from laufruhe.present.numbers import DASH, aligned, number, percent
-from laufruhe.present.recorded_gas import HEAD, gas_note, gas_rows
 from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.problem.loads import PointLoads
@@ -107,9 +107,9 @@ def _amplitudes(loads: PointLoads) -> list[Array]:
 
 
 def gas(result: Result) -> list[Table]:
-    """Return a row per operating point with a recorded pressure trace."""
+    """Return a row of key figures per operating point with gas."""
     rows, note = gas_rows(result.problem), " ".join(gas_note(result.problem))
-    return [Table(HEAD, rows, title="Recorded gas pressure", note=note, file="gas-pressure")]
+    return [Table(HEAD, rows, title="Gas pressure", note=note, file="gas-pressure")]
 
 
 def torque(result: Result) -> list[Table]:

@@ -1,17 +1,20 @@
-"""Key figures of recorded pressure traces as text."""
+"""Key figures of the gas as text."""
 
 from __future__ import annotations
 
-from laufruhe.physics.recorded_gas import GasFacts, cylinder_facts
+from laufruhe.errors import counted
+from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
 from laufruhe.present.numbers import DEGREE, trimmed
 from laufruhe.problem.problem import Problem
 
 HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "mean torque [N m]", "power [kW]", "power [kW/l]")
-"""Heads of the figures of a recorded trace."""
+"""Heads of the figures of the gas."""
+_LINES = 8
+"""Largest number of operating points with a line of their own."""
 
 
 def gas_rows(problem: Problem) -> list[tuple[str, ...]]:
-    """Return a row of figures for each operating point with a recorded trace, after its name."""
+    """Return a row of figures for each operating point with gas, after its name."""
     return [(name, *_figures(facts)) for name, facts in _facts(problem)]
 
 
@@ -21,14 +24,15 @@ def gas_note(problem: Problem) -> list[str]:
 
 
 def gas_lines(problem: Problem) -> list[str]:
-    """Return sentences on how the file of a recorded trace was read, and a line for each operating point with it."""
-    lines = [f"gas: {sentence}" for sentence in gas_note(problem)]
-    for name, peak, angle, imep, torque, power, density in gas_rows(problem):
+    """Return sentences on how the file of a recorded trace was read, and a line for each operating point with gas."""
+    lines, rows = [f"gas: {sentence}" for sentence in gas_note(problem)], gas_rows(problem)
+    for name, peak, angle, imep, torque, power, density in rows[:_LINES]:
         lines.append(
             f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, mean torque {torque} N m, "
             f"power {power} kW, {density} kW/l"
         )
-    return lines
+    further = len(rows) - _LINES
+    return [*lines, f"gas: the report has {counted(further, 'further operating point')}"] if further > 0 else lines
 
 
 def _facts(problem: Problem) -> list[tuple[str, GasFacts]]:
