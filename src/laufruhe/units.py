@@ -16,7 +16,7 @@ LONGEST = 100
 MAX_FACTORS = 12
 """Largest number of names in one unit."""
 _QUANTITY = re.compile(
-    r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .·-]*|(?:1 ?)?/ ?min)?\s*$"
+    r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .·⁻-]*|(?:1 ?)?/ ?min)?\s*$"
 )
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
 """Number with a decimal comma."""
@@ -24,6 +24,8 @@ THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
 """Number with a comma that may separate thousands."""
 # cm2 is read as cm^2; the digit of H2O is no power
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
+# lb-ft is a product; the minus of min-1 stands before a digit
+_HYPHEN = re.compile(r"(?<=[a-z])-(?=[a-z])")
 _NAME = r"(?!\d)(?:(?![⁰¹²³⁴-⁹])[\w°%])+"
 _POWERED = rf"{_NAME}(?:⁻?[⁰¹²³⁴-⁹]| ?(?:\^|\*\*) ?-?[0-9](?:\.[0-9]{{1,3}})?)?"
 _PRODUCT = re.compile(rf"{_POWERED}(?:(?: ?[*/.] ?| +){_POWERED}){{,{MAX_FACTORS - 1}}}")
@@ -34,24 +36,28 @@ _TURNING = re.compile("radian|degree|turn|revolution|arcminute|arcsecond|grad")
 _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
     "newton_metre = newton * meter = Nm",
+    "@alias pound = lbm",
     "pferdestaerke = 75 * kilogram_force * meter / second = PS",
 )
 
 _SPELLINGS: dict[str, dict[str, str]] = {
     "m": {"Zoll": "inch"},
-    "kg m": {"kgm": "kg m", "kgcm": "kg cm", "kgmm": "kg mm", "gcm": "g cm", "gmm": "g mm", "oz-in": "oz in"},
+    "kg m": {"kgm": "kg m", "kgcm": "kg cm", "kgmm": "kg mm", "gcm": "g cm", "gmm": "g mm", "ozin": "oz in"},
     "kg m^2": {"kgm^2": "kg m^2", "kgm2": "kg m^2", "kgcm^2": "kg cm^2", "kgcm2": "kg cm^2", "kgmm^2": "kg mm^2"},
-    "Pa": {"PSI": "psi"},
+    "N": {"lb": "lbf", "lbs": "lbf"},
+    "Pa": {"PSI": "psi", "kg/cm^2": "kgf/cm^2", "kg/cm2": "kgf/cm^2", "Torr": "torr", "ata": "at"},
     "N m": {
-        **dict.fromkeys(("lb ft", "ft lb", "lb-ft", "ft-lb", "lbft"), "lbf ft"),
-        "lb in": "lbf in",
-        "in lb": "lbf in",
+        **dict.fromkeys(("lb ft", "ft lb", "lbft", "ftlb"), "lbf ft"),
+        **dict.fromkeys(("lb in", "in lb"), "lbf in"),
+        **dict.fromkeys(("mkp", "kpm", "mkg"), "kp m"),
     },
-    "N/m": {"lb/in": "lbf/in"},
+    "N/m": {"lb/in": "lbf/in", "lbs/in": "lbf/in"},
     "rad": dict.fromkeys(("Grad", "°KW", "°CA"), "deg"),
     "rad/s": {
-        **dict.fromkeys(("RPM", "U/min", "r/min", "rev/min", "1/min", "/min", "min^-1", "min-1", "Upm"), "rpm"),
-        "Hz": "turn/s",
+        **dict.fromkeys(
+            ("RPM", "U/min", "r/min", "rev/min", "1/min", "/min", "min^-1", "min-1", "min⁻¹", "Upm", "upm"), "rpm"
+        ),
+        **dict.fromkeys(("Hz", "rps", "rev/s", "r/s", "U/s"), "turn/s"),
     },
 }
 """Spellings of units in the trade, by SI unit: those that the registry does not know or reads as another unit."""
@@ -99,6 +105,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 @cache
 def _factor(unit: str, si_unit: str) -> float:
     """Return the SI value of one `unit`, in the dimension of `si_unit`."""
+    unit = _HYPHEN.sub(" ", unit)
     unit = _SPELLINGS.get(si_unit, {}).get(unit) or _POWER.sub(r"^\1", unit).replace("·", "*")
     if si_unit == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would pass for a frequency 2 pi too high
@@ -236,8 +243,8 @@ def dimension_of(text: str) -> str | None:
     return None
 
 
-_LENGTH, _MASS, _FORCE = "(?:[nµumcdk]?m|in|inch|ft)", "(?:[mkM]?g|t|lb|oz)", "(?:[mkM]?N|k?p|kgf|lbf)"
-_BY, _OVER, _SQUARE = r"(?: ?[*·.] ?| )", " ?/ ?", r"(?:\^|\*\*)?2"
+_LENGTH, _MASS, _FORCE = "(?:[nµumcdk]?m|in|inch|ft)", "(?:[mkM]?g|t|lbm?|oz)", "(?:[mkM]?N|k?p|kgf|lbf)"
+_BY, _OVER, _SQUARE = r"(?: ?[*·.] ?| |-)", " ?/ ?", r"(?:\^|\*\*)?2"
 _WRITTEN = {
     "m": _LENGTH,
     "kg": _MASS,

@@ -42,21 +42,39 @@ def said(engine: str = "", point: str = "", text: str = SINGLE) -> str:
         ),
         ("crank_radius", "did you mean 'stroke', twice the crank radius?"),
         ("throw_radius", "did you mean 'stroke', twice the crank radius?"),
-        ("conrod_length", "did you mean 'rod_length'?"),
-        ("Pleuellänge", "did you mean 'rod_length'?"),
-        ("Pleuellaenge", "did you mean 'rod_length'?"),
-        ("Hub", "did you mean 'stroke'?"),
-        ("Bohrung", "did you mean 'bore'?"),
+        ("conrod_length", "did you mean 'rod_length', between the centres of its ends?"),
+        ("Pleuellänge", "did you mean 'rod_length', between"),
+        ("Pleuellaenge", "did you mean 'rod_length', between"),
+        ("Hub", "did you mean 'stroke', such as"),
+        ("Bohrung", "did you mean 'bore', such as"),
         ("Kolben", "did you mean 'reciprocating_mass'"),
         ("Pleuel", "did you mean 'rod', a table of mass, centre_of_gravity and inertia?"),
         (
             "rod_mass",
             "did you mean 'rod', a table of mass, centre_of_gravity and inertia; or add the small end's share to",
         ),
-        ("Zündfolge", "did you mean 'firing_order'?"),
+        ("Zündfolge", "did you mean 'firing_order', such as [1, 3, 4, 2]?"),
         ("journal", "did you mean the table [[main_bearings]]?"),
-        ("wrist pin", "did you mean 'piston_pin' of [running_gear]?"),
-        ("Drehzahl", "did you mean 'speed' of [[operating_points]]?"),
+        (
+            "wrist pin",
+            "did you mean 'piston_pin' of [running_gear], a table for stresses; the mass of the pin goes into",
+        ),
+        ("Drehzahl", "did you mean 'speed' of [[operating_points]], such as \"1500 rpm\"?"),
+        ("ring_mass", "did you mean 'reciprocating_mass', the mass of piston, rings and pin"),
+        ("Kolbenringe", "did you mean 'reciprocating_mass'"),
+        ("gudgeon_pin_weight", "did you mean 'reciprocating_mass'"),
+        ("conrod_weight", "did you mean 'rod', a table of mass"),
+        ("small end", "did you mean 'reciprocating_mass'"),
+        ("throw", "did you mean 'throws', the angles of all throws"),
+        ("Hubraum", "give bore, stroke and cylinders"),
+        ("Zündabstände", "did you mean 'firing_intervals', such as [270, 450]"),
+        ("Drehrichtung", "did you mean 'rotation', clockwise or counter-clockwise, seen from the front?"),
+        ("Wuchtgüte", "did you mean 'residual_unbalance' of [tolerances], a grade of ISO 21940-11 such as"),
+        ("Motorlager", "did you mean the table [mounts]"),
+        ("Ausgleichswellen", "did you mean the table [[balancer_shafts]]"),
+        ("Leistung", "give imep of [gas] or brake_torque of [[operating_points]]"),
+        ("friction", "it is the table [friction]"),
+        ("bore_mm", "did you mean 'bore', whose unit stands with its number"),
         ("strok", "did you mean 'stroke'?"),
     ],
 )
@@ -67,7 +85,7 @@ def test_a_word_of_the_trade_leads_to_its_key(word: str, remedy: str) -> None:
 
 def test_the_key_that_a_word_means_is_not_missed_too() -> None:
     assert said(text=SINGLE.replace("stroke =", "Hub =")) == (
-        """problem: engine.Hub = "80 mm": is not a key here; did you mean 'stroke'?"""
+        """problem: engine.Hub = "80 mm": is not a key here; did you mean 'stroke', such as "80 mm"?"""
     )
 
 
@@ -84,9 +102,24 @@ def _keys(model: type[BaseModel], known: set[type[BaseModel]]) -> set[str]:
 
 def test_every_word_means_a_key_that_there_is() -> None:
     keys = _keys(file_model(), set())
-    for word, key, _ in trade_words():
-        assert key in keys
+    for word, key, note in trade_words():
+        assert key in keys or (key == "" and note)
         assert key in [meant for meant, _ in meanings(word.upper().replace(" ", "_"))]
+
+
+@pytest.mark.parametrize(
+    ("key", "word", "remedy"),
+    [("cycle", "Viertakt", "did you mean 'four-stroke'?"), ("layout", "Reihe", "did you mean 'inline'?"),
+     ("rotation", "ccw", "did you mean 'counter-clockwise'?"), ("rotation", "left", "use one of: clockwise, counter")],
+)  # fmt: skip
+def test_a_value_in_words_of_the_trade(key: str, word: str, remedy: str) -> None:
+    lines = {"cycle": 'cycle = "four-stroke"', "layout": 'layout = "inline"'}
+    text = SINGLE.replace(lines.get(key, "{engine}"), f'{key} = "{word}"')
+    assert f'engine.{key} = "{word}": is not allowed; {remedy}' in said(text=text)
+
+
+def test_a_mass_for_a_table_is_answered_with_the_keys_of_the_table() -> None:
+    assert "must be one table, in [ ]; give diameter, width there" in said(engine='big_end = "0.3 kg"')
 
 
 @pytest.mark.parametrize("speed", ["1500 1/min", "1500 U/min", "1500 RPM", "25 Hz", "1500/min"])

@@ -21,13 +21,14 @@ from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, pr
 from laufruhe.extension import HOMES, INSTALL, Tables, missing_extension
 from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.toml_text import toml_key
-from laufruhe.files.trade_words import meanings
+from laufruhe.files.trade_words import meanings, trade_value
 
 Loc: TypeAlias = tuple[str | int, ...]
 MAX_COMPLAINTS = 20
 """Largest number of complaints about a file at once."""
 _CLOSE = 0.6
 _MAX_NAMED = 3
+_UNIT_SUFFIX = re.compile(r"_(mm|cm|m|kg|g|rpm|bar|deg|Nm|N)$")
 _TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
 """Kinds of extension objects by the keys of a file that name such an object."""
 _COUNTED = {
@@ -150,11 +151,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         return Complaint(where, "", *missing_extension(HOMES["keys"][str(loc[0])]))
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
-        homes = _homes(str(loc[-1]), model)
-        remedy = nearest(str(loc[-1]), keys, f"it stands in {' or '.join(homes)}" if homes else "")
-        remedy = remedy if homes else _of_trade(str(loc[-1]), keys, model) or remedy
-        if loc[-1] == "unit":
-            remedy = 'write the unit with its number, as in "120 mm"'
+        remedy = _key_remedy(str(loc[-1]), keys, model)
         return Complaint(where, value_text(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
@@ -167,17 +164,23 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
         value = detail["ctx"].get("tag", detail["input"])
-        table = _TABLES.get(where.rpartition(".")[2])
+        key = where.rpartition(".")[2]
+        table = _TABLES.get(key)
         if table and (extension := HOMES[table].get(str(value))):
             return Complaint(where, value_text(value), *missing_extension(extension))
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         # two or three words are all named, because the nearest spelling may be the wrong one
         remedy = nearest(str(value), words) if len(words) > _MAX_NAMED else "use one of: " + ", ".join(words)
+        if (meant := trade_value(key, str(value))) in words:
+            remedy = f"did you mean '{meant}'?"
         return Complaint(where, value_text(value), "is not allowed", remedy)
     if kind in _COUNTED:
         sense, key, remedy = _COUNTED[kind]
         rule = f"has {detail['ctx']['actual_length']} entries, and {sense} {detail['ctx'][key]} are allowed"
         return Complaint(where, value_text(detail["input"]), rule, remedy)
+    if kind.startswith("model_") and tables:
+        remedy = f"give {', '.join([*tables[0].model_fields][:_MAX_NAMED])} there"
+        return Complaint(where, value_text(detail["input"]), _RULES[kind], remedy)
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
     form = FORMS.get(detail["ctx"]["pattern"]) if kind == "string_pattern_mismatch" else None
     rule, _, remedy = (form or _RULES.get(kind, message)).partition("; ")
@@ -193,23 +196,30 @@ def _homes(key: str, model: type[BaseModel]) -> list[str]:
 
 
 def _head(name: str, model: type[BaseModel]) -> str:
-    return f"[[{name}]]" if "list[" in str(model.model_fields[name].annotation) else f"[{name}]"
+    return f"[[{name}]]" if str(model.model_fields[name].annotation).startswith("list[") else f"[{name}]"
 
 
-def _of_trade(word: str, keys: Sequence[str], model: type[BaseModel]) -> str:
-    """Return the remedy for a word of the trade: its key in this table, else a table or its key in the only other one.
+def _key_remedy(word: str, keys: Sequence[str], model: type[BaseModel]) -> str:
+    """Return the remedy for a word that is none of the keys of a table.
 
-    It is empty for other words.
+    A key that the word means in the trade comes first, then the tables that have such a key, then a similar key.
     """
+    stem = _UNIT_SUFFIX.sub("", word)
+    if stem in keys:
+        return f"did you mean '{stem}', whose unit stands with its number, as in \"120 mm\"?"
     for key, note in sorted(meanings(word), key=lambda meaning: meaning[0] not in keys):
-        what = f", {note}" if note else ""
-        if key in keys:
-            return f"did you mean '{key}'{what}?"
+        homes = _homes(key, model)
+        if not key:
+            return note
+        if key in keys or (0 < len(homes) <= _MAX_NAMED and key not in model.model_fields):
+            place = "" if key in keys else f" of {' or '.join(homes)}"
+            return f"did you mean '{key}'{place}{f', {note}' if note else ''}?"
         if key in model.model_fields:
-            return f"did you mean the table {_head(key, model)}?"
-        if len(homes := _homes(key, model)) == 1:
-            return f"did you mean '{key}' of {homes[0]}{what}?"
-    return ""
+            return f"did you mean the table {_head(key, model)}{f', {note}' if note else ''}?"
+    if word in model.model_fields:
+        return f"it is the table {_head(word, model)}"
+    homes = _homes(word, model)
+    return f"it stands in {' or '.join(homes)}" if homes else nearest(word, keys)
 
 
 class Refused(LaufruheError):

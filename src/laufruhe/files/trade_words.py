@@ -33,13 +33,18 @@ def _by_word() -> dict[str, list[tuple[str, str]]]:
     return dict(by_word)
 
 
+@cache
 def _plain(word: str) -> str:
-    return re.sub(r"[\s_-]+", "", word.lower().translate(_LETTERS))
+    letters = re.sub(r"[\s_/-]+", "", word.lower().translate(_LETTERS))
+    for other, synonym in _tables()["synonyms"].items():
+        letters = letters.replace(other, synonym)
+    return letters
 
 
 def meanings(word: str) -> list[tuple[str, str]]:
     """Return the keys that a word of the trade means, each with a note on what it is; empty for other words."""
-    return _by_word().get(_plain(word), [])
+    plain = _plain(word)
+    return _by_word().get(plain) or _by_word().get(plain.removesuffix("s"), [])
 
 
 @cache
