@@ -117,6 +117,12 @@ class TestGap:
         assert make_certificate(0.0, 0.0, 0.0, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.GLOBAL
         assert make_certificate(1e-6, 0.0, 1e-9, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.LOCAL
 
+    def test_a_difference_that_counts_as_zero_is_stated(self) -> None:
+        """It proves the optimum; a reader still sees that value and bound differ."""
+        found = make_certificate(1e-6, 0.9999e-6, 1e-9, 1e-6, ProofStrength.RELAXED, 0.0, "")
+        assert found.kind is Proof.GLOBAL
+        assert found.gap == pytest.approx(1e-4)
+
     def test_nothing_is_a_rounding_of_the_parts_and_not_of_the_sum(self, tmp_path: Path) -> None:
         """A balanced six has the parts of a single cylinder six times; soft mounts have no resonance of their own."""
         six = problem_of(tmp_path, SIX)

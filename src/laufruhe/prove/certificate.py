@@ -18,14 +18,19 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import check_bound, is_over
 
 
-def gap_of(value: float, bound: float, zero_level: float) -> float:
-    """Return the relative gap (value - bound) / value, or 0 if the difference is at most `zero_level`.
+def relative_gap(value: float, bound: float, zero_level: float) -> float:
+    """Return the relative gap (value - bound) / value, or 0 if the value is at most `zero_level` or the bound.
 
     A value that is zero, negative or infinite is returned as it is. All gaps of the package are computed here.
     """
     if not 0.0 < value < math.inf:
         return value
-    return (value - bound) / value if value - bound > zero_level else 0.0
+    return (value - bound) / value if value > max(bound, zero_level) else 0.0
+
+
+def gap_of(value: float, bound: float, zero_level: float) -> float:
+    """Return the relative gap that a search has to close, which is 0 for a difference of at most `zero_level`."""
+    return 0.0 if 0.0 < value < math.inf and value - bound <= zero_level else relative_gap(value, bound, 0.0)
 
 
 ROUNDING = 1e-12
@@ -107,8 +112,8 @@ def make_certificate(
     value, bound = float(value), max(float(bound), 0.0)
     if not check_bound(method, bound, value, zero_level + value_error):
         return unproven_certificate(value, kkt_residual, method)
-    gap = gap_of(value, bound, zero_level)
-    if gap <= tolerance:
+    gap = relative_gap(value, bound, zero_level)
+    if gap_of(value, bound, zero_level) <= tolerance:
         kind = Proof.GLOBAL
     elif strength is ProofStrength.EXACT or (strength is ProofStrength.PARTIAL and gap <= SMALL_GAP):
         kind = Proof.WITHIN_GAP
@@ -119,7 +124,7 @@ def make_certificate(
 
 def unproven_certificate(value: float, kkt_residual: float, method: str) -> Certificate:
     """Return a certificate that claims nothing: no proof, and zero as the lower bound."""
-    return Certificate(Proof.NONE, 0.0, gap_of(value, 0.0, 0.0), kkt_residual, method)
+    return Certificate(Proof.NONE, 0.0, relative_gap(value, 0.0, 0.0), kkt_residual, method)
 
 
 @dataclass(frozen=True)
@@ -133,7 +138,7 @@ class Certificate:
     lower_bound
         Lower bound of the objective over all feasible designs [SI].
     gap
-        Objective less lower bound, over the objective; differences below the zero level count as zero.
+        Objective less lower bound, over the objective; zero if the objective is a numerical zero.
     kkt_residual
         Largest violation of stationarity, feasibility and complementarity, each
         relative to its own scale.

@@ -23,10 +23,11 @@ HEAD = (
     "their largest error", "memory", "regret", "regret bound",
 )  # fmt: skip
 COLUMNS = (
-    "**Evaluate, solve**: processor time of these calls, with all preparation. **Scene of a sweep**: the solve of a "
-    "study at another speed. **10,000 designs**: random designs between their bounds in one batch, preparation "
-    "included; only if all open numbers are unbalances. **Memory**: largest memory of the solve, or of the "
-    "evaluation if nothing is open, in Python and NumPy (tracemalloc); a solve of 2 s or more is not repeated for it. "
+    "**Evaluate, solve**: processor time of these calls of Python, of a problem that is loaded, after a first call. "
+    "**Scene of a sweep**: the solve of a study at another speed. **10,000 designs**: `evaluate_many` of random "
+    "designs between their bounds; only if all open numbers are unbalances. **Memory**: largest memory of the solve, "
+    "or of the evaluation if nothing is open, in Python and NumPy (tracemalloc); a solve of 2 s or more is not "
+    "repeated for it. "
     "**Regret**: exact objective of this fidelity's design over that of the best design known, minus one. "
     "**Regret bound**: what `solve` states of it. A design that breaks a limit by more than 0.1 % in the exact "
     "model shows that excess instead. `auto` computes all physics in a solve, and takes fewer samples for many designs."
@@ -38,7 +39,7 @@ INDEX = (
 )  # fmt: skip
 INDEX_COLUMNS = (
     "*One solve, ten thousand designs*: the fastest fidelity whose design, and whose largest error, is within 0.1 %, "
-    "and its processor time with all preparation; one evaluation if nothing is open. "
+    "and its processor time after a first call; one evaluation if nothing is open. "
     "*Regret*: exact objective of a fidelity's design over that of the best design known, minus one. "
     "*Beyond a limit*: share by which that design breaks a limit in the exact model, stated above 0.1 %. "
     "*Uneven speed*: change of the objective with a flywheel that leaves 2 % of irregularity."

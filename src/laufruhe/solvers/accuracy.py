@@ -17,7 +17,7 @@ from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.evaluation import Evaluation, objective_value, value_of_loads
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import PROOF_RANK, Proof, gap_of
+from laufruhe.prove.certificate import PROOF_RANK, Proof, relative_gap
 from laufruhe.solvers.result import Result, Status
 
 TIMES, MAX_GAS = 4, 23040
@@ -71,7 +71,8 @@ def solve_accurately(problem: Problem, solve: Callable[[Problem], Result]) -> Re
     bound, zero_level = max(proof.lower_bound - gas_error, 0.0), numerical_zero(result.problem, result.final.engine)
     weaker = replace(
         proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=PROOF_RANK), lower_bound=bound,
-        gap=gap_of(objective.value, bound, zero_level), method=f"{proof.method}, less the error of the gas pressure",
+        gap=relative_gap(objective.value, bound, zero_level),
+        method=f"{proof.method}, less the error of the gas pressure",
     )  # fmt: skip
     status = Status.FEASIBLE if result.status is Status.OPTIMAL else result.status
     return replace(result, status=status, certificate=weaker)

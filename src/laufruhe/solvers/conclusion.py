@@ -23,7 +23,14 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, gap_of, make_certificate, unproven_certificate
+from laufruhe.prove.certificate import (
+    Certificate,
+    Proof,
+    ProofStrength,
+    make_certificate,
+    relative_gap,
+    unproven_certificate,
+)
 from laufruhe.prove.witness import Witness
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.prices import ACTIVE, Price
@@ -252,7 +259,7 @@ def result_of(design: Design, baseline: Design, proof: ProofData, timing: dict[s
     else:
         # an infeasible design proves nothing
         bound = max(proof.bound, 0.0)
-        gap = gap_of(design.value, bound, zero_level)
+        gap = relative_gap(design.value, bound, zero_level)
         certificate = Certificate(Proof.NONE, bound, gap, proof.kkt_residual, proof.method)
         message = violation_message(problem, design.evaluation)
     # prices below the gap are rounding errors

@@ -25,7 +25,7 @@ from laufruhe.problem.evaluation import (
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof, gap_of
+from laufruhe.prove.certificate import Proof, gap_of, relative_gap
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values, violation_message
 from laufruhe.solvers.result import Result, Status
 
@@ -63,20 +63,20 @@ def _with_fine_values(result: Result) -> Result:
     value = objective.value - _sampling_error(problem, result.measured)
     final = with_fine_sampling(result.final) if result.measured is result.final else result.final
     zero_level = numerical_zero(problem, final.engine)
-    gap = gap_of(value, proof.lower_bound, zero_level)
     value_error = sum(term.weight * measure_sampling_error(term.measure, final) for term in problem.objective)
     check_bound(proof.method, proof.lower_bound, value, zero_level + value_error)
+    is_closed = gap_of(value, proof.lower_bound, zero_level) <= problem.tolerance
     weaker_kind = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
     is_feasible = (
         violation_at_fine_sampling(problem, result.final) <= FEASIBILITY_TOL or result.measured is not result.final
     )
-    kind = Proof.NONE if not is_feasible else Proof.GLOBAL if gap <= problem.tolerance else weaker_kind
+    kind = Proof.NONE if not is_feasible else Proof.GLOBAL if is_closed else weaker_kind
     status = Status.FAILED if not is_feasible else Status.OPTIMAL if kind is Proof.GLOBAL else Status.FEASIBLE
     return replace(
         result,
         status=status,
         objective=replace(objective, value=value),
-        certificate=replace(proof, kind=kind, gap=gap),
+        certificate=replace(proof, kind=kind, gap=relative_gap(value, proof.lower_bound, zero_level)),
         limits=limit_values(problem, final, result.prices, value) if result.measured is result.final else result.limits,
         final=final,
         message=result.message if is_feasible else violation_message(problem, final),
@@ -143,7 +143,7 @@ def _gap_disagreement(result: Result) -> float:
     if abs(excess) <= SMALL_ERROR * problem.tolerance * value:
         return 0.0
     zero_level = numerical_zero(problem, result.final.engine)
-    proven = gap_of(value, proof.lower_bound, zero_level) <= problem.tolerance
+    proven, stated = (gap_of(v, proof.lower_bound, zero_level) <= problem.tolerance for v in (value, objective.value))
     # a lower bound above the objective proves nothing
-    is_same = proven is (proof.gap <= problem.tolerance) and proof.lower_bound <= value * (1.0 + problem.tolerance)
+    is_same = proven is stated and proof.lower_bound <= value * (1.0 + problem.tolerance)
     return 0.0 if is_same else max(abs(excess) / (problem.tolerance * value), LARGE_ERROR)

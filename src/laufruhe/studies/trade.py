@@ -8,10 +8,12 @@ import tracemalloc
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import TypeVar
 
 import numpy as np
 
+import laufruhe
 from laufruhe.errors import ModelError, SolverError, plural
 from laufruhe.fidelity.automatic import GAS, ROD
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, reference
@@ -25,11 +27,11 @@ from laufruhe.physics.steady_state import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers import evaluate_only, solve
 from laufruhe.solvers.conclusion import FEASIBLE
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.many import values_of_columns
 from laufruhe.studies.swept import solve_scene
 
 T = TypeVar("T")
@@ -38,8 +40,8 @@ KEEPS = 1e-3
 """Largest relative violation of a limit, at the reference, with which a design counts as a decision."""
 DESIGNS = 10_000
 """Number of designs of the batch."""
-FASTER = 1.01
-"""Factor on the speed at every operating point of the scene that stands for those of a sweep."""
+FASTER = 1.001
+"""Factor between the speeds of two scenes of a sweep."""
 TRIED = (1e-2, 1e-3, 1e-4)
 """Tolerances at which a trade tries the automatic choice."""
 TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
@@ -49,7 +51,7 @@ GAS_ORDERS = 12
 TIME_ORDERS, TIME_SAMPLES = 12, 360
 """Orders and samples in the time domain; more orders take minutes."""
 _REPEATED, _MAX_REPEATS, _LONG = 0.3, 50, 2.0
-"""Time [s] and number of calls after which a call is not repeated, and time of a solve that is made once only."""
+"""Time [s] and number of calls after which a call is not repeated, and time of a first call that is the only one."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,8 @@ class TradeRow:
     error, estimate
         Error of the objective of the initial design relative to the reference, and its estimate.
     evaluation, solve, scene, batch
-        Processor time [s] of `evaluate`, of `solve`, of a scene of a sweep, and of `DESIGNS` designs in one batch,
-        all with preparation.
+        Processor time [s] of a further call of `laufruhe.evaluate`, of `laufruhe.solve`, of a scene of a sweep, and of
+        `laufruhe.evaluate_many` with `DESIGNS` designs.
     batch_error
         Largest relative error of the objective of a design of the batch.
     memory
@@ -243,56 +245,54 @@ class Batch:
                 designs = prepare(problem.at(EXACT.exact(REFERENCE_SAMPLES)))
                 rng = np.random.default_rng(0)
                 sizes, turns = rng.random((2, DESIGNS, len(problem.decisions)))
-                sets = [decision.set for decision in problem.decisions]
-                self.values = np.stack([
-                    (s.lower + (s.upper - s.lower) * sizes[:, k])
-                    * np.exp(1j * (s.angles[0] + (s.angles[1] - s.angles[0]) * turns[:, k]))
-                    for k, s in enumerate(sets)
-                ], axis=1)  # fmt: skip
-                self._exact = designs.objective(self.values)
+                self.columns: dict[str, Array] = {}
+                for k, decision in enumerate(problem.decisions):
+                    (low, high), s = decision.set.angles, decision.set
+                    self.columns[decision.name] = s.lower + (s.upper - s.lower) * sizes[:, k]
+                    if s.width > 1:
+                        self.columns[decision.angle_name] = low + (high - low) * turns[:, k]
+                values, _ = values_of_columns(problem.decisions, self.columns, DESIGNS)
+                self._exact = designs.objective(values)
 
     def by(self, variant: Problem) -> tuple[float, float]:
         """Return the time of the batch at a fidelity [s], and its largest relative error."""
         if self._exact is None or variant.fidelity.mounts == "time":
             return math.nan, math.nan
-        values, spent = timed(lambda: prepare(variant).objective(self.values))
+        table, spent = timed(lambda: laufruhe.evaluate_many(variant, self.columns))
+        values = table["objective"].to_numpy()
         return spent, float(np.max(np.abs(values - self._exact) / np.where(self._exact > 0.0, self._exact, math.inf)))
-
-
-def _decide(problem: Problem) -> Result:
-    # as `laufruhe.solve` does
-    return solve(replace(problem, sharply=True), diagnose=True)
 
 
 def measured(name: str, variant: Problem, scale: ErrorReference, batch: Batch) -> TradeRow:
     """Measure a fidelity, all but its regret."""
     truth = objective_value(variant, scale.best)
-    initial, evaluate_time = timed(lambda: evaluate_only(variant, allow_resonance=True))
-    value = objective_value(variant, initial.final)
-    solve_time = scene_time = optimum = violation = bound = math.nan
+    initial = evaluate_start(variant)
+    value = objective_value(variant, initial)
+    evaluate_time = solve_time = scene_time = optimum = violation = bound = math.nan
+    with suppress(ModelError):
+        # the design may stand on an undamped resonance
+        evaluate_time = timed(lambda: laufruhe.evaluate(variant))[1]
     if is_open(variant) and variant.fidelity.mounts != "time":
         with suppress(SolverError, ModelError):
-            result, solve_time = timed(lambda: _decide(variant))
+            result, solve_time = timed(lambda: laufruhe.solve(variant))
             bound = math.nan if result.regret_bound is None else result.regret_bound
             if result.status.has_design:
                 best = reference(variant, result.final.engine)
                 optimum, violation = objective_value(variant, best), best.violation(variant.limits)
             if solve_time < _LONG and variant.points:
-                points = tuple(replace(point, speed=FASTER * point.speed) for point in variant.points)
-                scene = replace(variant, points=points)
-                scene_time = timed(lambda: solve_scene(scene))[1]
+                # a sweep has each speed once, so loads of another speed help no scene
+                times = (FASTER**k for k in count(1))
+                scene_time = timed(lambda: solve_scene(_times_faster(variant, next(times))))[1]
     memory = math.nan
     if not solve_time >= _LONG:
         with suppress(SolverError, ModelError):
-            memory = peak_memory(
-                lambda: _decide(variant) if solve_time < _LONG else evaluate_only(variant, allow_resonance=True)
-            )
+            memory = peak_memory(lambda: laufruhe.solve(variant) if solve_time < _LONG else laufruhe.evaluate(variant))
     spent, batch_error = batch.by(variant)
     return TradeRow(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
         # the error is relative to the computed value; the table states it relative to the reference
-        estimate=scale.error_of(initial.final) * value / truth if truth > 0.0 else 0.0,
+        estimate=scale.error_of(initial) * value / truth if truth > 0.0 else 0.0,
         evaluation=evaluate_time,
         solve=solve_time,
         scene=scene_time,
@@ -303,6 +303,10 @@ def measured(name: str, variant: Problem, scale: ErrorReference, batch: Batch) -
         violation=violation,
         regret_bound=bound,
     )
+
+
+def _times_faster(problem: Problem, times: float) -> Problem:
+    return replace(problem, points=tuple(replace(point, speed=times * point.speed) for point in problem.points))
 
 
 def _price_of_time(problem: Problem) -> TimeDomain | None:
@@ -347,10 +351,9 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
 
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:
-    """Return what a call returns, and its least processor time of a few calls [s], each without cached loads."""
+    """Return what a call returns, and its least processor time of several calls [s], or of one that takes over 2 s."""
     times: list[float] = []
-    while not times or (sum(times) < _REPEATED and len(times) < _MAX_REPEATS):
-        forget()
+    while sum(times) < (_REPEATED if len(times) > 1 else _LONG) and len(times) < _MAX_REPEATS:
         started = time.process_time()
         result = work()
         times.append(time.process_time() - started)

@@ -18,7 +18,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import best_bound, gap_of
+from laufruhe.prove.certificate import best_bound, relative_gap
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
@@ -119,7 +119,7 @@ class Follower:
             values=tuple(domain.complex_value(x) for domain in self._model.domains),
             value=value,
             bound=bound.value,
-            gap=gap_of(value, bound.value, self._zero_level),
+            gap=relative_gap(value, bound.value, self._zero_level),
             standing=tuple(limit_values.get(limit.name, np.nan) for limit in limits),
             prices=tuple(price.get(limit.name, 0.0) for limit in limits),
         )

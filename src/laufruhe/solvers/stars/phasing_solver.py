@@ -110,7 +110,7 @@ def _with_more_samples(problem: Problem, families: Sequence[Family], result: Res
     """Return the result of searches with more samples, while sampling errors keep the gap open (P7)."""
     for _ in range(ROUNDS):
         gap = result.certificate.gap if result.certificate else 0.0
-        if gap <= problem.tolerance or is_time_over():
+        if gap <= problem.tolerance or result.status is Status.OPTIMAL or is_time_over():
             break
         # the error of sample averages is proportional to the square of the step
         factor = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MAX_TIMES)
