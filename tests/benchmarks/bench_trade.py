@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import importlib
 import json
-import math
 import re
 import time
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,10 @@ from pages import PAGES, processor_seconds, publish, spent
 import laufruhe
 from laufruhe.cli.fidelity import traded
 from laufruhe.fidelity.error_bounds import ErrorReference
-from laufruhe.load_models.batch import prepare
+from laufruhe.files.toml_text import toml_text
 from laufruhe.numerics.cores import processors
-from laufruhe.physics.shaking_loads import forget
-from laufruhe.studies.trade import KEEPS, NO_GAS, RIGID, TWO_ORDER, Batch, ladder, measured
+from laufruhe.problem.problem import Problem
+from laufruhe.studies.trade import FASTER, KEEPS, NO_GAS, RIGID, TWO_ORDER, Batch, ladder, measured
 from problem_files import PROBLEMS
 
 FOLDER = PAGES.parent / "trade"
@@ -31,6 +32,12 @@ SHOWN = (
     RIGID, NO_GAS, TWO_ORDER, "orders to 4, 96 steps", "orders to 8, 192 steps", "orders to 24, 360 steps",
     "exact, 720 steps", "auto 0.01", "auto 0.001", "auto 0.0001",
 )  # fmt: skip
+COMPARED = (
+    "tractor-single", "tractor-two", "tractor-three", "tractor-four-lanchester", "tractor-six", "inline-five-shafts",
+    "vee-two-90", "vee-six-60", "vee-eight-cross", "tractor-single-shafts",
+)  # fmt: skip
+WORDS = {"evaluation": "evaluate", "solve": "solve", "scene": "scene of a sweep", "batch": "10,000 designs"}
+ROUNDS = 3
 LEAST, BEYOND = 1e-8, 20.0
 """What is under it is drawn at it; and where designs beyond a limit are."""
 
@@ -71,35 +78,61 @@ def draw(trades: list[dict[str, Any]]) -> None:
 
 
 def separate_calls() -> list[str]:
-    """Times by a trade at fidelity `auto`, and of the public calls after it."""
+    """Prices of a trade at fidelity `auto`, and the times of public calls."""
     lines = [
         "## A trade beside separate calls",
         "",
-        "Processor time of each call by the trade, and of the same public call after it, the least of a few.",
+        f"Processor time of each call by the trade, and of the same public call alone, the least of {ROUNDS} in turns.",
+        "A scene is one of six in a sweep of the speed: the time of a study of eight less that of one of two.",
+        "Scenes of one problem differ: those of `tractor-two` take 130 or 290 ms, as the speed has it.",
         "",
         "| problem | call | trade | separate call | ratio |",
         "| --- | --- | ---: | ---: | ---: |",
     ]
-    for name in SOLVED[:10]:
+    for name in COMPARED:
         problem = laufruhe.load(PROBLEMS / f"{name}.toml")
         scale, batch = ErrorReference.of(problem), Batch(problem)
         (variant,) = (variant for rung, variant in ladder(scale) if rung == "auto 0.001")
-        row = measured("auto 0.001", variant, scale, batch)
-        calls: list[tuple[str, float, Callable[[], object]]] = [
-            ("evaluate", row.evaluation, lambda own=variant: laufruhe.evaluate(own)),
-            ("solve", row.solve, lambda own=variant: laufruhe.solve(own)),
+        calls: dict[str, Callable[[], float]] = {
+            "evaluation": lambda own=variant: min(spent(lambda: laufruhe.evaluate(own)) for _ in range(30)),
+            "solve": lambda own=variant: min(spent(lambda: laufruhe.solve(own)) for _ in range(3)),
+            "scene": lambda own=problem: _scene_of_study(own),
+            "batch": lambda own=variant, b=batch: min(
+                spent(lambda: laufruhe.evaluate_many(own, b.columns)) for _ in range(3)
+            ),
+        }
+        rounds = [
+            (measured("auto 0.001", variant, scale, batch), {call: work() for call, work in calls.items()})
+            for _ in range(ROUNDS)
         ]
-        if math.isfinite(row.batch):
-            calls.append(("10,000 designs", row.batch, lambda own=variant, b=batch: prepare(own).objective(b.values)))
-        for call, seconds, work in calls:
-            alone = min(_alone(work) for _ in range(50 if seconds < 5e-3 else 5))
-            lines.append(f"| {name} | {call} | {1e3 * seconds:.2f} ms | {1e3 * alone:.2f} ms | {seconds / alone:.2f} |")
+        for call, words in WORDS.items():
+            price, alone = min(getattr(row, call) for row, _ in rounds), min(times[call] for _, times in rounds)
+            cells = f"{1e3 * price:.2f} ms | {1e3 * alone:.2f} ms | {price / alone:.2f}"
+            lines.append(f"| {name} | {words} | {cells} |")
     return [*lines, ""]
 
 
-def _alone(work: Callable[[], object]) -> float:
-    forget()
-    return spent(work)
+def _scene_of_study(problem: Problem) -> float:
+    """Processor time of a scene in a study of the public call at fidelity `auto 0.001` [s]."""
+    tables = dict(problem.origin.tables)
+    tables["fidelity"] = {"kinematics": "auto", "tolerance": 1e-3}
+    (key,) = {"speed", "mean_piston_speed"} & tables["operating_points"][0].keys()
+    number, unit = str(tables["operating_points"][0][key]).split()
+
+    def sweep(scenes: int) -> float:
+        speeds = [f"{float(number) * FASTER**k} {unit}" for k in range(1, scenes + 1)]
+        part = {
+            "name": "sweep", "kind": "layout comparison", "title": "sweep",
+            "sweep": [{"quantity": f"operating_points.1.{key}", "values": speeds}],
+            "cases": [{"name": "one", "problem": "problem.toml"}],
+        }  # fmt: skip
+        with TemporaryDirectory() as folder:
+            study = Path(folder) / "study.toml"
+            study.write_text(toml_text({"title": "sweep", "study": {"parts": [part]}}), encoding="utf-8")
+            (study.parent / "problem.toml").write_text(toml_text(tables), encoding="utf-8")
+            return spent(lambda: laufruhe.study(study))
+
+    return (sweep(8) - sweep(2)) / 6.0
 
 
 def main() -> None:

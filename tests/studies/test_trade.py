@@ -55,6 +55,22 @@ def test_advice_is_of_one_solve_and_of_many_designs() -> None:
     assert choices(_trade(one, wrong)) == (one, one)
 
 
+@pytest.mark.parametrize(("first", "calls"), [(0.1, 4), (1.0, 2), (3.0, 1)])
+def test_a_call_is_repeated_unless_it_takes_seconds(first: float, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A first call fills caches, which a user's further calls have."""
+    clock = [0.0]
+    monkeypatch.setattr("laufruhe.studies.trade.time.process_time", lambda: clock[0])
+    count = 0
+
+    def work() -> None:
+        nonlocal count
+        count += 1
+        clock[0] += first if count == 1 else 0.8 * first
+
+    assert timed(work)[1] == pytest.approx(first if calls == 1 else 0.8 * first)
+    assert count == calls
+
+
 @pytest.mark.slow
 def test_rows_are_what_separate_calls_take_and_return() -> None:
     """Values exactly; times within a factor of two, because other work shares the machine."""

@@ -24,7 +24,7 @@ HEAD = (
 )  # fmt: skip
 COLUMNS = (
     "**Evaluate, solve**: processor time of these calls of Python, of a problem that is loaded, after a first call. "
-    "**Scene of a sweep**: the solve of a study at another speed. **10,000 designs**: `evaluate_many` of random "
+    "**Scene of a sweep**: mean solve of a study at other speeds. **10,000 designs**: `evaluate_many` of random "
     "designs between their bounds; only if all open numbers are unbalances. **Memory**: largest memory of the solve, "
     "or of the evaluation if nothing is open, in Python and NumPy (tracemalloc); a solve of 2 s or more is not "
     "repeated for it. "
