@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import laufruhe
 from lanes import first_fast
@@ -20,7 +21,7 @@ from laufruhe.extensions.run_ups.linear_run import LinearRun
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.matrices import RunMatrices
 from laufruhe.extensions.run_ups.moments import RunMoments
-from laufruhe.extensions.run_ups.motion import MotionEquations, Steps, _force
+from laufruhe.extensions.run_ups.motion import MotionEquations, Steps, _between, _force
 from laufruhe.extensions.run_ups.peaks import RunPeaks
 from laufruhe.extensions.run_ups.runs import run_loads, run_through
 from laufruhe.files.reader import load_tables, tables_of
@@ -306,6 +307,83 @@ def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
     of = SimpleNamespace(count=boxes, first=0.0 * first, maps=SimpleNamespace(bends=curved, remainder=0.0 * rest))
     force = curved.sum(axis=1) @ (by.sum(axis=1) + bent.sum(axis=1))[:, n:]
     assert _force(of, middle, by, bent) == pytest.approx(np.linalg.norm(force, axis=1), rel=1e-12)
+
+
+def orders_within(first: Array, second: Array, a: Array, start: Array, load: Array, times: Array) -> list[Array]:
+    """Return z0, z_1 and z_11 of one open number at some times under a constant load, by one matrix exponential."""
+    m = len(a)
+    whole = np.zeros((3 * m + 1, 3 * m + 1))
+    for k in range(3):
+        whole[k * m : (k + 1) * m, k * m : (k + 1) * m] = a
+    whole[m : 2 * m, :m] = whole[2 * m : 3 * m, m : 2 * m] = first
+    whole[2 * m : 3 * m, :m] = second
+    whole[:m, -1] = load
+    z = np.array([expm(t * whole) @ np.append(start, 1.0) for t in times])
+    return [z[:, k * m : (k + 1) * m].T for k in range(3)]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_forces_within_a_step_exceed_those_at_its_ends_by_no_more_than_is_told(seed: int) -> None:
+    """One spring or several, a load that jumps, from motion in some orders alone: against the exact motion."""
+    r, n = np.random.default_rng(seed), 1 + seed % 3
+    frequency, rates, zeros = r.uniform(2.0, 8.0), r.choice([0.0, 1.0], 3), np.zeros((n, n))
+    spring, change = frequency * np.eye(n), r.uniform(0.1, 1.0) * np.eye(n)
+    a = np.block([[zeros, spring], [-spring, -r.choice([0.0, 0.3]) * np.eye(n)]])
+    first = np.block([[zeros, zeros], [-change, -r.choice([0.0, 0.2]) * change]])
+    bends, rest = rates[0] * r.normal(size=(1, n, n)), rates[1] * np.abs(r.normal(size=(n, n)))
+    second = np.block([[zeros, zeros], [zeros, -bends[0]]])
+    maps = SimpleNamespace(bends=bends[None], remainder=rest[None])
+    of = SimpleNamespace(count=1, matrix=a[None], first=first[None, None], second=second[None, None], maps=maps)
+    times, tight = np.linspace(0.0, 0.2 / frequency, 101), []
+    step = times[-1]
+    position = np.concatenate([np.ones(n), np.zeros(n)])
+    # from a motion of first order alone the second one falls to nothing, so that its force is curved downwards
+    falling = np.concatenate([0.0 * position, position, frequency * change[0, 0] * step**2 * position])
+    starts = [np.repeat(shares, 2 * n) * r.normal(size=6 * n) for shares in (np.ones(3), *np.eye(3))]
+    for start, is_loaded in [(falling, 0.0), *((start, rates[2]) for start in starts)]:
+        load = is_loaded * np.concatenate([np.zeros(n), r.normal(size=n)])
+        z0, z1, z2 = orders_within(first, second, a, start, load, times)
+        force = _force(of, z0[None], z1[None, None], z2[None, None])[0]
+        ends = [z[..., [0, -1]] for z in (z0[None], z1[None, None], z2[None, None])]
+        size = np.full((1, 1), np.linalg.norm(load))
+        told = _between(of, step, *ends, step * size, size)[0, 0]
+        excess = np.trapezoid(force, times) / step - 0.5 * (force[0] + force[-1])
+        assert excess <= told * (1.0 + 1e-9) + 1e-12
+        tight.append(excess / (told or 1.0))
+    assert max(tight) > 0.01
+
+
+def test_a_motion_of_unit_energy_has_no_larger_signal_than_its_gain() -> None:
+    """Random maps from motion to signals with their change by open numbers, for the softest design of a box."""
+    r = np.random.default_rng(2)
+    boxes, sides, places, d, n, times = 2, 2, 2, 3, 4, 3
+    roots_of_stiffness = r.normal(size=(boxes, n, n)) + 3.0 * np.eye(n)
+    look = _RunBounds.__new__(_RunBounds)
+    look._d = d
+    look._equations = SimpleNamespace(softest=roots_of_stiffness @ np.swapaxes(roots_of_stiffness, 1, 2))
+    for shares in ((1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0)):
+        still, changing, beyond = (share * np.ones(1) for share in shares)
+        maps = look._maps = SimpleNamespace(
+            position=still * r.normal(size=(boxes, places * d, n)), rate=still * r.normal(size=(boxes, places * d, n)),
+            positions=changing * r.normal(size=(boxes, sides, places * d, n)),
+            rates=changing * r.normal(size=(boxes, sides, places * d, n)),
+            beyond_linear=beyond * np.abs(r.normal(size=(boxes, places * d, n))),
+        )  # fmt: skip
+        directions = r.normal(size=(boxes, places, d, times))
+        directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+        told, maximum = look._gains(directions), np.zeros((boxes, places, times))
+        for s in np.vstack([r.uniform(-1.0, 1.0, (20, sides)), r.choice([-1.0, 1.0], (40, sides))]):
+            position = maps.position + np.tensordot(s, maps.positions, axes=(0, 1))
+            rate = maps.rate + np.tensordot(s, maps.rates, axes=(0, 1))
+            rate = rate + r.choice([-1.0, 1.0], rate.shape) * maps.beyond_linear
+            at_unit = position @ np.swapaxes(np.linalg.inv(roots_of_stiffness), 1, 2)
+            # the largest signal along a direction is the length of its row
+            along = [
+                np.einsum("bpdt,bpdn->bptn", directions, m.reshape(boxes, places, d, n)) for m in (at_unit, rate)
+            ]
+            maximum = np.maximum(maximum, np.linalg.norm(np.concatenate(along, axis=-1), axis=-1))
+        assert np.all(maximum <= told * (1.0 + 1e-12))
+        assert np.all(told <= 10.0 * maximum)
 
 
 @pytest.mark.slow

@@ -86,8 +86,7 @@ class RunBoxes:
         maps_of, d = self._rows[measure]
         maps = mapped(maps_of, box_equations.above, box_equations.halves, box_equations.turn, box_equations.roots)
         run_bounds = [_RunBounds(box_equations, run, maps, d).under() for run in self._runs]
-        minima = [np.nan_to_num(run_bound.minimum, nan=-np.inf) for run_bound in run_bounds]
-        return choose(run_bounds, np.argmax(minima, axis=0))
+        return choose(run_bounds, np.argmax([run_bound.minimum for run_bound in run_bounds], axis=0))
 
 
 def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, without_stops: bool) -> RunPeaks:
