@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from laufruhe.problem.channels import motion_indices, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_numbers import RANGES, maximum_shares, shortfall
+from laufruhe.prove.mounts.box_numbers import RANGES, _projection_bounds, maximum_shares, shortfall
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
@@ -119,6 +120,39 @@ def test_no_design_of_a_box_is_under_its_bound(tmp_path, asked):
         assert minimum <= min(values) * (1.0 + 1e-9)
         told += minimum > 0.5 * min(values)
     assert told
+
+
+def test_every_mode_of_modes_that_coincide_is_allowed_its_share():
+    """Two modes of one frequency may turn into each other, whatever rounding says of their frequencies."""
+    r = np.random.default_rng(4)
+    for _ in range(20):
+        root, basis = r.normal(size=(6, 6)) + 3.0 * np.eye(6), np.linalg.qr(r.normal(size=(6, 6)))[0]
+        squares = np.array([2e3, 2e3, *r.uniform(3e3, 9e3, 4)])
+        stiffness = (basis * squares) @ basis.T
+        model = SimpleNamespace(
+            root=root, stiffness=lambda x, k=stiffness: np.repeat(k[None], len(x), axis=0),
+            slopes={"stiffness": np.zeros((1, 6, 6))},
+        )  # fmt: skip
+        measure = SimpleNamespace(motions=("bounce",))
+        (told,) = maximum_shares(model, measure, np.ones((1, 1)), np.ones((1, 1)))
+        a, b = root[:, 2] @ basis, np.linalg.inv(root)[2] @ basis
+        # the share of a mode in the plane of both is a quadratic form of its direction
+        both = np.linalg.eigvalsh(0.5 * (np.outer(a[:2], b[:2]) + np.outer(b[:2], a[:2])))[1]
+        assert told[0] >= max(both, *(a * b)[2:]) * (1.0 - 1e-9)
+
+
+def test_a_projection_is_no_longer_than_components_allow():
+    """Of unit vectors with bounds of their components; where a vector may have all bounds at once, it has the bound."""
+    r = np.random.default_rng(9)
+    for size in (2.0, 0.6, 0.2):
+        vector, parts = r.normal(size=(30, 6)), np.minimum(size * r.random((30, 1, 6)), 1.0)
+        told = _projection_bounds(vector, parts)[:, 0]
+        unit = np.sign(vector) * parts[:, 0]
+        length = np.linalg.norm(unit, axis=1)
+        true = np.abs(np.sum(vector * unit, axis=1)) / np.maximum(length, 1.0)
+        assert np.all(true <= told * (1.0 + 1e-12))
+        assert told[length <= 1.0] == pytest.approx(true[length <= 1.0], rel=1e-12)
+    assert np.all(length <= 1.0)
 
 
 def _share(problem, x):

@@ -64,3 +64,21 @@ def test_shafts_that_turn_with_the_firing_leave_nothing_known() -> None:
     (candidate, _), *_ = even_stars(own.phasing)
     realised = replace(own.phasing.problem_of(candidate), phasing=None)
     assert firing_bound(own, evaluate(realised)) == 0.0
+
+
+def test_shafts_that_the_design_leaves_out_or_cylinders_of_its_own_leave_nothing_known() -> None:
+    """Another design may have these shafts; and the loads of unlike cylinders are not one load shifted."""
+    own = problem("inline", cylinders=4)
+    (candidate, _), *_ = even_stars(own.phasing)
+    realised = replace(own.phasing.problem_of(candidate), phasing=None)
+
+    def bound(unlike: float, known: Problem) -> float:
+        first, *others = realised.engine.slider_cranks
+        parts = (replace(first, reciprocating_mass=unlike * first.reciprocating_mass), *others)
+        return firing_bound(known, evaluate(realised, replace(realised.engine, rotors=(), slider_cranks=parts)))
+
+    alike = replace(own, engine=replace(own.engine, rotors=()))
+    assert own.engine.rotors
+    assert bound(1.0, alike) > 0.0
+    assert bound(1.0, own) == 0.0
+    assert bound(1.1, alike) == 0.0

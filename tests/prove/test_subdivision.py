@@ -18,8 +18,9 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import lower_bound_of_norm
+from laufruhe.prove.mounts.box_norms import counted_rows, lower_bound_of_norm, norm_under
 from laufruhe.prove.mounts.box_numbers import sag, sag_under
+from laufruhe.prove.mounts.box_series import LinearResponse
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_problem, stiffness_bounds
 from laufruhe.prove.witness import Witness
 from laufruhe.report.wording import explained
@@ -127,6 +128,44 @@ def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     assert lacking[1] < 1.1e-2 * lacking[0]
 
 
+NORMS = {
+    "rms": lambda lengths, _: np.sqrt(np.mean(lengths**2)),
+    "mean": lambda lengths, _: np.mean(lengths),
+    "maximum": lambda lengths, _: lengths.max(),
+    "peak to peak": lambda _, rows: np.linalg.norm(rows[:, None] - rows, axis=-1).max(),
+}
+
+
+@pytest.mark.parametrize("norm", NORMS)
+def test_no_response_that_is_linear_in_a_box_is_under_the_bound_of_its_norm(norm: str, tmp_path: Path) -> None:
+    """Random amplitudes of two orders with random slopes: every norm as it is defined, at random places of a box."""
+    asked = f'[objective]\nminimise = "{norm} mount force"\norders = [2, 4]\n[fidelity]\nsamples = 72\n'
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked)
+    measure, r = problem.objective[0].measure, np.random.default_rng(7)
+    lines, count = StiffnessBoxes(problem, 0.0).model.loaded_orders(measure), len(counted_rows(problem, measure)[0])
+    angles, k = np.linspace(0.0, np.pi, 180, endpoint=False), len(lines.orders)
+    tight = []
+    for size in (1.0, 0.1, 0.01):
+        value, slopes = (
+            r.normal(size=(5, k, *more, 2 * count)).view(np.complex128) for more in ((), (2,))
+        )
+        slopes = size * slopes
+        left_out = LinearResponse(value, slopes, np.zeros((5, k)), np.zeros((5, k, 2)))
+        found = norm_under(problem, measure, left_out, lines)
+        for s in np.vstack([np.zeros(2), r.uniform(-1.0, 1.0, (6, 2)), r.choice([-1.0, 1.0], (4, 2))]):
+            told = found.value - found.remainder + found.slopes @ s
+            amplitudes = value + np.einsum("n,bknr->bkr", s, slopes)
+            signal = np.einsum("bkr,kt->btr", amplitudes, np.exp(1j * np.outer(lines.orders, angles))).real
+            for own, at_box in zip(told, signal, strict=True):
+                rows = at_box.reshape(len(angles), -1, 3).swapaxes(0, 1)
+                true = [NORMS[norm](np.linalg.norm(each, axis=-1), each[::2]) for each in rows]
+                exact = {"rms": np.sqrt(np.mean(np.square(true))), "mean": np.mean(true)}.get(norm, max(true))
+                assert own <= exact * (1.0 + 1e-3)
+                tight.append(own / exact)
+    # the middle of a box is known
+    assert max(tight) > 0.99
+
+
 def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, 'minimise = "static sag"')
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
@@ -136,6 +175,21 @@ def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
     for share in np.random.default_rng(6).random((20, low.shape[1])):
         line = found.value + found.slopes @ (2.0 * share - 1.0)
         assert np.all(line <= sag(search.model, low + share * (high - low)) * (1.0 + 1e-12))
+
+
+def test_a_box_whose_softest_corner_carries_nothing_has_a_line_under_its_sag(tmp_path: Path) -> None:
+    """No design of it is under the line, which is zero where the middle carries nothing either."""
+    bottomless = changed(MOUNTS, *[('"20 N/mm", "4000 N/mm"', '"0 N/mm", "4000 N/mm"')] * 2)
+    problem = asked_for(tmp_path, 'minimise = "static sag"', mounts=bottomless)
+    search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
+    high = np.array([search.model.upper, 0.0 * search.model.upper])
+    found = sag_under(search.model, measure, 0.0 * high, high)
+    assert found.minimum[1] == 0.0
+    shares = np.random.default_rng(6).uniform(1e-3, 1.0, (200, high.shape[1]))
+    values = sag(search.model, shares * high[0])
+    lines = found.value[0] + (2.0 * shares - 1.0) @ found.slopes[0]
+    assert np.all(lines <= values * (1.0 + 1e-12))
+    assert np.max(lines / values) > 0.9
 
 
 LIMITS = """

@@ -662,3 +662,6 @@ def test_what_is_a_share_of_a_norm_may_be_so_much_larger(share: float, tmp_path:
         look.cut_off([replace(variable, share=own, loss=0.0)], boxes._roots[0]).uppers[0] for own in (1.0, share)
     )
     assert part == pytest.approx(whole / share**2, rel=1e-12)
+    # what other orders may take off the norm is allowed to a root on top of it
+    lossy = look.cut_off([replace(variable, loss=0.3 * variable.unit)], boxes._roots[0]).uppers[0]
+    assert math.sqrt(lossy) == pytest.approx(math.sqrt(whole) + 0.3, rel=1e-12)

@@ -398,9 +398,10 @@ def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
     assert minimum(found)[0] == -np.inf
 
 
-def stopped(maximum: str, stiffness: str = "300 N/mm", **more: Any) -> Problem:
-    """With stops at 1.1 mm, and a limit of travel."""
-    told = random_tables(7, constraints=[{"limit": "run-up travel", "max": maximum}], **more)
+def stopped(maximum: str, stiffness: str = "300 N/mm", further: tuple[str, ...] = (), **more: Any) -> Problem:
+    """With stops at 1.1 mm, and limits of travel."""
+    limits = [{"name": each, "limit": "run-up travel", "max": each} for each in (maximum, *further)]
+    told = random_tables(7, constraints=limits, **more)
     for place in told["mounts"]["places"]:
         place["stop"] = {"gap": "1.1 mm", "stiffness": stiffness}
     return load_tables(told, Path("stopped.toml"))
@@ -415,6 +416,10 @@ def test_stops_that_limits_keep_away_from_are_not_met() -> None:
     assert not bounds_runs(stopped("1.0995 mm"))
     assert not bounds_runs(stopped("1.2 mm"))
     assert not bounds_runs(stopped("1.05 mm", "1e9 N/mm"))
+
+
+def test_the_tightest_limit_keeps_away_from_stops() -> None:
+    assert bounds_runs(stopped("1.2 mm", further=("1.05 mm", "2 mm")))
 
 
 @pytest.mark.slow

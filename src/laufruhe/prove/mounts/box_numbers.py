@@ -52,11 +52,11 @@ def sag(model: BoxModel, x: Array) -> Array:
 def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> LinearBound:
     """Return a linear lower bound of the static sag on boxes: its tangent at their middles, because sag is convex (E9).
 
-    The bound is zero if mounts leave a motion without stiffness at the softest corner.
+    The bound is zero if mounts leave a motion without stiffness at the middle.
     """
     weight, halves = weight_wrench(model.mounting(model.lower).block), 0.5 * (upper - lower)
     matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
-    stable = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
+    stable = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
     y = np.linalg.solve(np.where(stable[:, None, None], matrices, np.eye(6)), pull)
     slopes = halves * np.einsum("bi,nij,bj->bn", y, model.slopes["stiffness"], y) / weight[2]
     return LinearBound(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(stable)
