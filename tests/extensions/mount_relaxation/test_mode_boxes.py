@@ -10,13 +10,14 @@ import pytest
 
 from extensions.mount_relaxation.test_spring_bound import powertrain
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
-from laufruhe.extensions.mount_relaxation.modes import mode_basis, mode_constraints
+from laufruhe.extensions.mount_relaxation.modes import ModeConstraints, mode_basis, mode_constraints
 from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
 from laufruhe.extensions.mount_relaxation.program import (
     ModeMultipliers,
     SdpMultipliers,
     SdpProgram,
     Solution,
+    _mode_bound,
     proven_bound,
 )
 from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
@@ -137,6 +138,35 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
         assert proven_bound(own, told.multipliers) - 0.05 < proven <= min(smallest, spring_mounts[number] + 0.05)
         for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
             assert proven_bound(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
+
+
+@pytest.mark.parametrize("size", [1.0, 0.1, 0.0])
+def test_the_bound_of_a_mode_is_under_its_lagrangian(size: float) -> None:
+    """Random conditions and multipliers, for coordinates w in the unit ball and numbers s between -1 and 1."""
+    r, count, d = np.random.default_rng(6), 2, 6
+    for _ in range(20):
+        square = r.normal(size=(3, 3, 1 + count, d, d))
+        mode = ModeConstraints(
+            (0.5 * (square + square.transpose(1, 0, 2, 3, 4)),), r.normal(size=(4, 1 + count, d, d)),
+            r.normal(size=(2, 1 + count, d, d)),
+        )  # fmt: skip
+        price = r.normal(size=(3, 3))
+        price = size * price @ price.T
+        signs = [tuple(m @ m.T for m in size * r.normal(size=(2, d, d))) for _ in range(count)]
+        told = ModeMultipliers(
+            [price], size * r.random(4), size * r.normal(size=2), size * r.normal(size=count), signs
+        )  # fmt: skip
+        slope, values = r.normal(size=d - 1), []
+        bound = _mode_bound(mode, told, slope)
+        for w, s in zip(r.normal(size=(200, d - 1)), r.uniform(-1.0, 1.0, (200, count)), strict=True):
+            z = np.append(1.0, w / np.linalg.norm(w))
+            moments = np.outer(z, z) * np.append(1.0, s)[:, None, None]
+            values.append(
+                slope @ z[1:] + told.corners @ s + told.equal @ np.einsum("nmxy,mxy->n", mode.equal, moments)
+                - told.sides @ np.einsum("nmxy,mxy->n", mode.sides, moments)
+                - np.sum(price * np.einsum("mabxy,mxy->ab", np.moveaxis(mode.matrices[0], 2, 0), moments))
+            )  # fmt: skip
+        assert bound <= min(values)
 
 
 @pytest.mark.slow

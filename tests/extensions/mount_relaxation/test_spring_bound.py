@@ -27,8 +27,8 @@ from laufruhe.extensions.mount_relaxation.program import (
     Solution,
     mode_scores,
 )
-from laufruhe.extensions.mount_relaxation.prover import spring_bound
-from laufruhe.extensions.mount_relaxation.response import ResponseBound
+from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
+from laufruhe.extensions.mount_relaxation.response import ResponseBound, response_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.extensions.mount_relaxation.symmetry_split import split_mounts, split_signal
 from laufruhe.files.reader import load
@@ -41,6 +41,7 @@ from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
+from mounts.files import OPEN as OPEN_STIFFNESS
 from problem_files import PROBLEMS
 from prove.test_subdivision import DAMPED, asked_for, divided_bound
 
@@ -651,6 +652,48 @@ def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
         assert np.all(mixed[k] > 0.0)
     assert np.all(plain[0] < 1e-9)
     assert np.all(plain[1] > 0.0)
+
+
+def test_a_place_behind_the_middle_is_narrowed_at_both_ends(tmp_path: Path) -> None:
+    """All better designs of a grid stay, and little more, with a number that is negative all over the box."""
+    fixed = MOUNTS.replace(OPEN_STIFFNESS, '"400 N/mm"').replace(
+        '["-300 mm"', '[{ between = ["-400 mm", "-50 mm"], start = "-300 mm" }'
+    )
+    asked = '[objective]\nminimise = "rms mount force"\norders = [2]\n'
+    problem = problem_of(tmp_path, ENGINE.replace("700 rpm", "500 rpm"), BLOCK, fixed, asked)
+    evaluation, (place,) = evaluate(problem), problem.mount_decisions
+    designs = np.linspace(place.lower, place.upper, 41)
+    values = [objective_value(problem, with_mounts(evaluation, problem.design([x]))) for x in designs.tolist()]
+    best, limit = float(designs[np.argmin(values)]), 1.01 * min(values)
+    boxes = SdpRelaxation(problem, limit, 1e-3, [best])
+    box, _ = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
+    assert box is not None
+    better = designs[np.array(values) <= limit]
+    assert better.min() - 0.02 < box[0][0] <= better.min() < better.max() <= box[1][0] < better.max() + 0.02
+
+
+def test_no_design_on_hydraulic_mounts_moves_more_than_is_told() -> None:
+    """Above all modes, at the stiffest corner: the load of the highest mode, and others, by solving for the motion."""
+    problem = load(POWERTRAIN.with_name("powertrain-hydraulic.toml"))
+    generator, chosen = np.random.default_rng(2), tuple(range(len(problem.engine.mounts)))
+    corner = np.array([d.upper for d in problem.mount_decisions])
+    mounts, tight = open_mounts(problem, corner, corner), 0.0
+    mounting = mounting_in(problem.design(corner.tolist(), problem.mount_decisions))
+    assert mounts.dynamic
+    stiffness, loss, damping = (
+        mounts.root @ mounting.total(each) @ mounts.root.T
+        for each in (mounting.springs, mounting.losses, mounting.dampers)
+    )
+    for omega in math.sqrt(mounts.highest) * np.array([1.2, 1.5, 2.0, 4.0]):
+        extra = mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0]
+        full = stiffness + extra + 1j * (loss + omega * damping) - omega**2 * np.eye(6)
+        for load_ in (np.linalg.eigh(stiffness + extra.real)[1][:, -1], *generator.normal(size=(5, 6))):
+            travel = mounting.motions @ mounts.root.T @ np.linalg.solve(full, load_)
+            told = response_bound(mounts, load_[None].astype(np.complex128), omega, True, chosen)
+            felt = float(np.linalg.norm(travel, axis=1).sum())
+            assert felt <= told * (1.0 + 1e-9)
+            tight = max(tight, felt / told)
+    assert tight > 0.3
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
