@@ -17,9 +17,10 @@ from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
 from laufruhe.prove.throws.star_cuts import cut_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars.cut_search import search_designs
+from laufruhe.solvers.stars.cut_search import _distinct_values, search_designs
+from laufruhe.solvers.stars.even_search import search_even
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.star_program import coarse_value, shaft_owners, solve_design
+from laufruhe.solvers.stars.star_program import SolvedStar, coarse_value, shaft_owners, solve_design
 from phasing import engines
 
 TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)
@@ -98,6 +99,39 @@ def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, b
     assert alone.certificate.kind is Proof.GLOBAL
     assert found.value == pytest.approx(alone.objective.value, rel=2e-4)
     assert coarse_value(model, star, built) == pytest.approx(found.value, rel=0.02)
+
+
+def test_a_shaft_that_has_to_be_heavy_is_left_out_where_it_harms(tmp_path):
+    """Beside one that may weigh nothing: against every star with every set of shafts that is allowed."""
+    heavy = engines.shaft("against", -1).replace('"0 kg m"', '"0.09 kg m"', 1).replace("{ between = [0, 360] }", "0")
+    rest = engines.MOUNTS + heavy + engines.shaft("second", 2) + engines.MOUNT_FORCE
+    problem = engines.problem(tmp_path, 3, rest=rest)
+    model, stars = model_of(problem)
+    sets = model.phasing.shafts.allowed
+    every = {built: solve_design(model, tuple(map(int, stars[0])), built, 1e-4)[0].value for built in sets}
+    assert min(every, key=every.get) == (1,)
+    found = search_designs(model, stars[:1], 1, 1e-4)
+    assert found.lower_bound <= min(every.values())
+    assert found.solved[0].value == pytest.approx(min(every.values()), rel=2e-4)
+
+
+def test_designs_that_are_told_as_proven_are_the_best(tmp_path):
+    problem = engines.problem(tmp_path, 5, phasing="best = 2", rest=CASES["rms"])
+    model, stars = model_of(problem)
+    found = search_even(problem, problem.phasing, families_of(problem.phasing)[0])
+    values = _distinct_values(model.space, search_designs(model, stars, 10**9, 1e-4).solved)
+    assert found.looked_at < len(stars)
+    assert [design.proven for design in found.designs] == [True, True]
+    assert [design.value for design in found.designs] == pytest.approx(values[:2], rel=2e-4)
+
+
+def test_designs_count_once_with_their_mirror_images_alone(tmp_path):
+    """An equal value of another star counts anew, and so does a mirror image with another value."""
+    model, _ = model_of(engines.problem(tmp_path, 5, rest=CASES["mean"]))
+    first, mirrored, other = (0, 1, 2, 3, 4), (0, 4, 3, 2, 1), (0, 2, 1, 3, 4)
+    given = [(first, 1.0), (mirrored, 1.0), (other, 1.0), (mirrored, 2.0)]
+    solved = [SolvedStar(star, (), value, value) for star, value in given]
+    assert _distinct_values(model.space, solved) == [1.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize("name", ["mean", "maximum", "balance factor", "limited"])

@@ -146,9 +146,7 @@ def test_no_response_that_is_linear_in_a_box_is_under_the_bound_of_its_norm(norm
     angles, k = np.linspace(0.0, np.pi, 180, endpoint=False), len(lines.orders)
     tight = []
     for size in (1.0, 0.1, 0.01):
-        value, slopes = (
-            r.normal(size=(5, k, *more, 2 * count)).view(np.complex128) for more in ((), (2,))
-        )
+        value, slopes = (r.normal(size=(5, k, *more, 2 * count)).view(np.complex128) for more in ((), (2,)))
         slopes = size * slopes
         left_out = LinearResponse(value, slopes, np.zeros((5, k)), np.zeros((5, k, 2)))
         found = norm_under(problem, measure, left_out, lines)

@@ -378,9 +378,7 @@ def test_a_motion_of_unit_energy_has_no_larger_signal_than_its_gain() -> None:
             rate = rate + r.choice([-1.0, 1.0], rate.shape) * maps.beyond_linear
             at_unit = position @ np.swapaxes(np.linalg.inv(roots_of_stiffness), 1, 2)
             # the largest signal along a direction is the length of its row
-            along = [
-                np.einsum("bpdt,bpdn->bptn", directions, m.reshape(boxes, places, d, n)) for m in (at_unit, rate)
-            ]
+            along = [np.einsum("bpdt,bpdn->bptn", directions, m.reshape(boxes, places, d, n)) for m in (at_unit, rate)]
             maximum = np.maximum(maximum, np.linalg.norm(np.concatenate(along, axis=-1), axis=-1))
         assert np.all(maximum <= told * (1.0 + 1e-12))
         assert np.all(told <= 10.0 * maximum)
