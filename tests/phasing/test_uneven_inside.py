@@ -50,6 +50,7 @@ TWIN = {
     "layout": "vee", "throws": "open", "firing_order": [1, 2], "bank_angle": {"between": [60, 120]}, "cylinders": 2
 }  # fmt: skip
 COARSE = {"samples": 96}
+LOAD = {"file": str(PROBLEMS / "compressor-torque.csv"), "angle_zero": "70 deg"}
 WIDE = {"intervals": {"largest_deviation": "100 deg"}}
 LOADS = (
     "main-bearing force", "main-bearing pressure", "crank-pin force", "side force", "rod force", "hammer blow",
@@ -79,7 +80,8 @@ SCENES = {
     "in line": (BETWEEN, 3, {}),
     "in line, two-stroke, two points": (BETWEEN | {"cycle": "two-stroke"}, 3, {
         "operating_points": [{"name": "a", "speed": "2500 rpm"}, {"name": "b", "speed": "900 rpm", "gas": False}]}),
-    "vee": (VEE, 2, {"phasing": WIDE}),
+    "in line, a load over the angle": (BETWEEN, 3, {"load_torque": LOAD}),
+    "vee": (VEE, 2, {"phasing": WIDE, "load_torque": LOAD}),
 }  # fmt: skip
 
 
@@ -116,7 +118,8 @@ def test_waves_of_throws_are_those_of_the_exact_model() -> None:
     rng = np.random.default_rng(3)
     cases = [(problem_of({"throws": "open", "firing_order": "open", "cylinders": 3}, f"rms {load}",
                          counterweights=[{"name": "web", "x": "20 mm", "opposite_throw": 2, "unbalance": "0.1 kg m"}],
-                         phasing={"intervals": {"largest_deviation": "60 deg"}})) for load in LOADS]  # fmt: skip
+                         phasing={"intervals": {"largest_deviation": "60 deg"}},
+                         load_torque=None if "force" in load else LOAD)) for load in LOADS]  # fmt: skip
     for problem in cases:
         phasing, windows = problem.phasing, windows_of(problem, problem.phasing)
         start = start_candidates(phasing, None, True)[0]
@@ -144,7 +147,7 @@ DECIDED = {
     "peak to peak stored work": {},
     "rms shaft stress": {"operating_points": [{"name": "a", "speed": "2500 rpm"}, {"name": "b", "speed": "3300 rpm"}]},
     "maximum shaft twist": {},
-    "degree of irregularity": {},
+    "degree of irregularity": {"load_torque": LOAD},
 }
 
 

@@ -31,13 +31,16 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
     # a problem that no method solves is not ok
     refuse(problem)
 
+    machine = drawing.engine.load_torque
+    loads = [f"load: {sentence}" for sentence in machine.recording] if machine else []
+
     def initial_as_json() -> str:
         from laufruhe.report.json_result import as_json
         from laufruhe.solvers import evaluate_only
 
         return as_json(evaluate_only(problem, allow_resonance=True))
 
-    return "".join(f"{line}\n" for line in (f"ok: {problem.summary}", *gas_lines(drawing))), initial_as_json
+    return "".join(f"{line}\n" for line in (f"ok: {problem.summary}", *gas_lines(drawing), *loads)), initial_as_json
 
 
 def warn(problem: Problem, path: Path) -> None:

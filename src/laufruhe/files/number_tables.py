@@ -45,12 +45,14 @@ _PRESSURES = {
     "bar": "bar", "mbar": "mbar", "pa": "Pa", "hpa": "hPa", "kpa": "kPa", "mpa": "MPa", "psi": "psi", "atm": "atm",
     "at": "kp/cm^2", "kp/cm2": "kp/cm^2", "kgf/cm2": "kp/cm^2", "kg/cm2": "kp/cm^2", "n/mm2": "N/mm^2",
 }  # fmt: skip
+_TORQUES = {"nm": "N m", "knm": "kN m"}
+_OVER_ANGLE = ("rad", "Pa", "N m")
 _GAUGE, _ABSOLUTE = ("g", "_g", "gauge", "ü"), ("a", "_a", "abs", "_abs", "absolute")
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit in a heading: SI unit of its dimension ("rad", "Pa", "s", "V"), its name, and True for a gauge pressure."""
+    """Unit in a heading: SI unit of its dimension (such as "rad"), its name, and True for a gauge pressure."""
 
     dimension: str
     name: str
@@ -82,6 +84,8 @@ def unit_in(text: str) -> Unit | None:
     plain = re.sub(r"[\s.^()<>\[\]-]+", "", text.lower()).replace("º", "°").replace("²", "2")
     if _ANGLE.fullmatch(plain):
         return Unit("rad", "rad" if plain.startswith("rad") else "deg")
+    if (torque := _TORQUES.get(re.sub("[·*]", "", plain))) is not None:
+        return Unit("N m", torque)
     if plain in _OTHER:
         return Unit(_OTHER[plain], plain)
     for suffix in ("", *_GAUGE, *_ABSOLUTE):
@@ -217,7 +221,7 @@ def _headings(rows: Sequence[Row], usual: Sequence[int], width: int) -> tuple[tu
     """
     aligned = [[_cell(row, column) for column in usual] for row in rows if len(usual) <= len(row) <= width]
     unit_rows = [
-        cells for cells in aligned if any(unit and unit.dimension in ("rad", "Pa") for unit in map(unit_in, cells))
+        cells for cells in aligned if any(unit and unit.dimension in _OVER_ANGLE for unit in map(unit_in, cells))
     ]
     name_rows = [cells for cells in aligned if cells not in unit_rows and 2 * sum(map(bool, cells)) >= len(cells)]
     names = tuple(name_rows[-1]) if name_rows else ("",) * len(usual)

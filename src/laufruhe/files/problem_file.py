@@ -18,6 +18,7 @@ from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
 from laufruhe.files.flywheel import FlywheelTable, GearedInertiaTable
 from laufruhe.files.gas import GasTable
+from laufruhe.files.load_torque import LoadTorqueTable
 from laufruhe.files.measures import ConstraintTable, ObjectiveTable
 from laufruhe.files.mounts import BlockTable, LoadCaseTable, MountsTable
 from laufruhe.files.nested import Place
@@ -140,6 +141,7 @@ class ProblemFile(Table):
     block: BlockTable | None = None
     load_cases: list[LoadCaseTable] = Field(default_factory=list)
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
+    load_torque: LoadTorqueTable | None = None
     flywheel: FlywheelTable | None = None
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)

@@ -27,6 +27,7 @@ from laufruhe.files.fields import Open
 from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
+from laufruhe.files.load_torque import load_torque_of
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import load_cases_of, mounts_of
 from laufruhe.files.nested import at, number_at, plain, walk, with_value_at
@@ -282,7 +283,9 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     engine = Engine(
         file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, bearings, wheel,
         geared, load_cases_of(file.load_cases, on_mounts.block),
+        load_torque=load_torque_of(file.load_torque, path.parent, cycle),
     )  # fmt: skip
+    load_said = [f"Load: {sentence}" for sentence in engine.load_torque.recording] if engine.load_torque else []
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     problem = Problem(
         name=printed(path.stem),
@@ -291,7 +294,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         points=points,
         decisions=(*loads, *on_mounts.decisions, *wheel_decisions),
         source=file.source,
-        assumptions=(*file.assumptions, *sense_of(table), *(brake.said if brake else ())),
+        assumptions=(*file.assumptions, *sense_of(table), *(brake.said if brake else ()), *load_said),
         tolerance=file.tolerance,
         mount_numbers=on_mounts.numbers,
         search=Search(**file.search.model_dump()),

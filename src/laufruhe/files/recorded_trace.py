@@ -1,11 +1,12 @@
-"""Pressure traces as test benches record them: columns, units, cycles, zeros of angle and pressure, noise."""
+"""Quantities over the crank angle as test benches record them: columns, units, cycles, zeros, noise."""
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 from pydantic import PlainValidator, WithJsonSchema
@@ -15,7 +16,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, nearest, si_value
 from laufruhe.files.csv_rows import table_of
 from laufruhe.files.fields import Table
-from laufruhe.files.number_tables import NumberTable, unit_in
+from laufruhe.files.number_tables import NumberTable, Unit, unit_in
 from laufruhe.machine import Cycle, PressureTrace
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.pressure_trace import smooth_cycle
@@ -74,43 +75,80 @@ class PegTable(Table):
     )
 
 
-class RecordedTable(Table):
-    """A recorded trace, as test benches and simulations write it: a text file, an .xlsx or a .mat file."""
+@dataclass(frozen=True)
+class Quantity:
+    """Quantity that a file records over the crank angle.
 
-    file: str = f.required("Text file, .xlsx or .mat file of crank angle and pressure, beside the problem.")
+    Attributes
+    ----------
+    name, si
+        Name, which begins its keys, and SI unit.
+    unit, factor
+        Unit of a file that names none, and of sentences, and its number in one SI unit.
+    what
+        Name of its column in a complaint.
+    """
+
+    name: str
+    si: str
+    unit: str
+    factor: float
+    what: str
+
+    def text(self, value: float, digits: int = 4) -> str:
+        """Return a value [SI] with its unit."""
+        return quantity_text(self.factor * value, self.unit, digits)
+
+
+PRESSURE = Quantity("pressure", "Pa", "bar", 1e-5, "pressure of the cylinder")
+
+
+class OverAngleTable(Table):
+    """A quantity over the crank angle, as test benches and simulations write it: a text, .xlsx or .mat file."""
+
+    records: ClassVar[Quantity]
+
+    file: str = f.required("Text file, .xlsx or .mat file beside the problem: crank angle, and values over it.")
     sheet: str | None = f.optional("Sheet of a spreadsheet; by default that with the most rows of numbers.")
     angle_column: Column | None = f.optional("Name or number of the column of crank angles, if it is not evident.")
+    angle_unit: str | None = f.optional("Unit of the angles, if it is not in the file; deg by default.")
+    cycles: CyclesChoice = f.optional(
+        "Of several cycles: their mean, the one with the highest peak, or that with this number.", "mean"
+    )
+    smooth: bool = f.optional("false keeps the noise of the measurement.", True)
+
+
+class RecordedTable(OverAngleTable):
+    """A recorded trace of pressure."""
+
+    records = PRESSURE
+
     pressure_column: Annotated[list[Column], f.ListOrSingle(Column)] | None = f.optional(
         "Name or number of the column of pressures, or several that are cycles of the cylinder."
     )
-    angle_unit: str | None = f.optional("Unit of the angles, if it is not in the file; deg by default.")
     pressure_unit: str | None = f.optional("Unit of the pressures, if it is not in the file; bar by default.")
     gauge: bool | None = f.optional("true: pressures count from crankcase_pressure. By default they are absolute.")
     peg: PegTable | None = f.optional("Moves a floating pressure to a known one, at one angle.")
-    cycles: CyclesChoice = f.optional(
-        "Of several cycles: their mean, the one with the highest pressure, or that with this number.", "mean"
-    )
-    smooth: bool = f.optional("false keeps the noise of the measurement.", True)
 
 
 class RecordedFile:
     """Columns of a recorded file, and sentences about how they are read."""
 
-    def __init__(self, table: RecordedTable, folder: Path, where: str) -> None:
-        self.table, self.where, self.said = table, where, list[str]()
+    def __init__(self, table: OverAngleTable, folder: Path, where: str) -> None:
+        self.table, self.where, self.said, self.records = table, where, list[str](), table.records
         self.numbers: NumberTable = table_of(table.file, folder / table.file, f"{where}.file", table.sheet)
         self.values = np.where(np.abs(self.numbers.values) < f.LARGEST, self.numbers.values, np.nan)
         if self.values.shape[1] < 2:
-            raise self.refused("has no columns of crank angle and pressure", "give a file with both")
+            raise self.refused(f"has no columns of crank angle and {self.records.name}", "give a file with both")
         if len(self.values) < _FEWEST:
             raise self.refused(f"has {counted(len(self.values), 'row')}, too few for a cycle", "give one every degree")
         self.angle_column = self._angle_column()
         self._require_unit(self.angle_column, "rad", "angle")
-        self.pressure_columns = self._pressure_columns()
-        self._require_unit(self.pressure_columns[0], "Pa", "pressure")
-        names = [self.name(column) for column in self.pressure_columns]
-        pressures = f"{names[0]} to {names[-1]}" if len(names) > _LISTED else ", ".join(names)
-        self.said.insert(0, f"Crank angle from {self.name(self.angle_column)}, pressure from {pressures}.")
+        self.columns = self._columns()
+        self._require_unit(self.columns[0], self.records.si, self.records.name)
+        names = [self.name(column) for column in self.columns]
+        listed = f"{names[0]} to {names[-1]}" if len(names) > _LISTED else ", ".join(names)
+        self.said.insert(0, f"Crank angle from {self.name(self.angle_column)}, {self.records.name} from {listed}.")
 
     def refused(self, rule: str, remedy: str, key: str = "file") -> Refused:
         """Return a refusal of the file, or of a key about it."""
@@ -158,31 +196,33 @@ class RecordedFile:
         if not turning and rising:
             first, last = _finite(values[:, rising[0]])[[0, -1]]
             rule = f"has no crank angles: {self.name(rising[0])} runs from {first:.6g} to {last:.6g}, as a time does"
-            remedy = "convert it to crank angle and pressure, which needs the dead centre and the gain of the sensor"
+            needs = "which needs the dead centre and the gain of the sensor"
+            remedy = f"convert it to crank angle and {self.records.name}, {needs}"
             raise self.refused(rule, remedy)
         return turning[0] if turning else 0
 
-    def _pressure_columns(self) -> list[int]:
-        words = self.table.pressure_column
+    def _columns(self) -> list[int]:
+        key = f"{self.records.name}_column"
+        words = getattr(self.table, key)
         if words is not None:
-            columns = [self._column(word, "pressure_column") for word in words]
+            columns = [self._column(word, key) for word in words]
             if not columns:
-                raise self.refused("names no column", "name one", "pressure_column")
+                raise self.refused("names no column", "name one", key)
             if len(set(columns)) < len(columns):
-                raise self.refused("names a column twice", "name it once", "pressure_column")
+                raise self.refused("names a column twice", "name it once", key)
             return columns
         values, units = self.values, self.numbers.units
         others = [k for k in range(len(units)) if k != self.angle_column]
-        columns = [k for k in others if (unit := units[k]) and unit.dimension == "Pa"]
+        columns = [k for k in others if (unit := units[k]) and unit.dimension == self.records.si]
         columns = columns or [k for k in others if units[k] is None]
         if not columns:
-            rule = f"has no pressures: {self.name(others[0])} has another unit"
-            raise self.refused(rule, "convert it to a pressure, which needs the gain of the sensor")
+            rule = f"has no {self.records.name}s: {self.name(others[0])} has another unit"
+            raise self.refused(rule, f"convert it to a {self.records.name}, which needs the gain of the sensor")
         ranges = {k: float(np.ptp(_finite(values[:, k]))) for k in columns}
         first = columns[0]
         if max(ranges.values()) > _LARGER * ranges[first]:
             names = ", ".join(map(self.name, columns))
-            raise self.refused(f"may have the pressure of the cylinder in {names}", "name one by pressure_column")
+            raise self.refused(f"may have the {self.records.what} in {names}", f"name one by {key}")
         alike = [k for k in columns if k == first or _correlation(values[:, first], values[:, k]) > _ALIKE]
         unused = [self.name(k) for k in others if k not in alike]
         self.said += [f"Columns that are not used: {', '.join(unused)}."] if unused else []
@@ -197,27 +237,19 @@ class RecordedFile:
             self.said.append(f"Angles are taken as {name}, because the file names no unit.")
         return self._used(self.angle_column) * si_value(f"1 {name}", "rad", f"{self.where}.angle_unit", name)
 
-    def pressures(self, air: float) -> Array:
-        """Return the pressures of all rows and columns [Pa]; `air` is added to those of a gauge."""
-        first, is_gauge = self.pressure_columns[0], self.table.gauge
-        of_file, name = self.numbers.units[first], self.table.pressure_unit
+    def read(self) -> tuple[Array, Unit | None]:
+        """Return the values of all rows and columns [SI], and the unit of their column if it has one."""
+        of_file, key = self.numbers.units[self.columns[0]], f"{self.records.name}_unit"
+        name, things = getattr(self.table, key), f"{self.records.name.capitalize()}s"
         of_key = unit_in(name) if name else None
         if name and of_file and of_key != of_file:
-            self.said.append(f"Pressures are taken as {name}, as the problem says; the file says {of_file.name}.")
+            self.said.append(f"{things} are taken as {name}, as the problem says; the file says {of_file.name}.")
         if not name and not of_file:
-            self.said.append("Pressures are taken as bar, because the file names no unit.")
+            self.said.append(f"{things} are taken as {self.records.unit}, because the file names no unit.")
         unit = of_key or (None if name else of_file)
-        text = unit.name if unit else name or "bar"
-        factor = si_value(f"1 {text}", "Pa", f"{self.where}.pressure_unit", name or text)
-        pressures = np.stack([self._used(column) for column in self.pressure_columns], axis=1) * factor
-        if is_gauge is None and self.table.peg is None:
-            heading = self.numbers.names[first]
-            is_gauge = bool((unit and unit.is_gauge) or _GAUGE_NAME.search(heading))
-        if is_gauge and self.table.peg is not None:
-            raise self.refused("is given beside peg, which finds the zero of the pressure", "keep one", "gauge")
-        if is_gauge:
-            self.said.append(f"Pressures are those of a gauge, in air of {1e-5 * air:.6g} bar.")
-        return pressures + (air if is_gauge else 0.0)
+        text = unit.name if unit else name or self.records.unit
+        factor = si_value(f"1 {text}", self.records.si, f"{self.where}.{key}", name or text)
+        return np.stack([self._used(column) for column in self.columns], axis=1) * factor, unit
 
     def _used(self, column: int) -> Array:
         missing = np.flatnonzero(np.isnan(self.values[:, column]))
@@ -225,6 +257,37 @@ class RecordedFile:
             rule = f"line {self.numbers.lines[missing[0]]} has no number in {self.name(column)}"
             raise self.refused(rule, "correct or remove it")
         return self.values[:, column]
+
+
+def _absolute(file: RecordedFile, table: RecordedTable, air: float) -> Array:
+    """Return the pressures of all rows and columns [Pa]; `air` is added to those of a gauge."""
+    pressures, unit = file.read()
+    is_gauge = table.gauge
+    if is_gauge is None and table.peg is None:
+        heading = file.numbers.names[file.columns[0]]
+        is_gauge = bool((unit and unit.is_gauge) or _GAUGE_NAME.search(heading))
+    if is_gauge and table.peg is not None:
+        raise file.refused("is given beside peg, which finds the zero of the pressure", "keep one", "gauge")
+    if is_gauge:
+        file.said.append(f"Pressures are those of a gauge, in air of {1e-5 * air:.6g} bar.")
+    return pressures + (air if is_gauge else 0.0)
+
+
+def smooth_values(
+    file: RecordedFile, angles: Array, values: Array, cycle: Cycle, pace: float
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return angles [rad] and values [SI] of one cycle over `pace`, without noise, from all rows and columns."""
+    angles, all_cycles = _cycles(file, angles, values, cycle.angle / pace)
+    chosen, table = _chosen(file, all_cycles), file.table
+    with errors_at_key(f"{file.where}.file", table.file):
+        smooth = smooth_cycle(angles, chosen, cycle, pace)
+    treatment = "kept"
+    if smooth.cut_off is not None and table.smooth:
+        angles, chosen = smooth.angles, smooth.pressures
+        treatment = f"removed by a low-pass that halves order {smooth.cut_off:.3g} of crank speed"
+    if smooth.noise > _ROUNDING * np.ptp(chosen):
+        file.said.append(f"Noise: {file.records.text(smooth.noise, 2)} rms, {treatment}.")
+    return angles, chosen
 
 
 def recorded_trace(
@@ -239,16 +302,7 @@ def recorded_trace(
     """
     file = RecordedFile(table, folder, where)
     period = cycle.angle / pace
-    angles, all_cycles = _cycles(file, file.angles(), file.pressures(air), period)
-    pressures = _chosen(file, all_cycles)
-    with errors_at_key(f"{where}.file", table.file):
-        smooth = smooth_cycle(angles, pressures, cycle, pace)
-    treatment = "kept"
-    if smooth.cut_off is not None and table.smooth:
-        angles, pressures = smooth.angles, smooth.pressures
-        treatment = f"removed by a low-pass that halves order {smooth.cut_off:.3g} of crank speed"
-    if smooth.noise > _ROUNDING * np.ptp(pressures):
-        file.said.append(f"Noise: {_bar(smooth.noise, 2)} rms, {treatment}.")
+    angles, pressures = smooth_values(file, file.angles(), _absolute(file, table, air), cycle, pace)
     _require_exchange(file, angles, pressures, cycle, period)
     exchange = 0.5 * period if cycle is Cycle.FOUR_STROKE else 0.0
     angles = angles - later
@@ -259,9 +313,10 @@ def recorded_trace(
         rise = table.peg.to - float(np.mean(pressures[np.abs(since) <= max(_PEG_WIDTH, float(np.abs(since).min()))]))
         pressures = pressures + rise
         at = math.degrees(table.peg.at)
-        file.said.append(f"Pressures are moved by {_bar(rise)}, to {_bar(table.peg.to)} at {at:.6g} deg.")
+        moved = f"{PRESSURE.text(rise)}, to {PRESSURE.text(table.peg.to)}"
+        file.said.append(f"Pressures are moved by {moved} at {at:.6g} deg.")
     if pressures.min() <= 0.0:
-        rule = f"has pressures down to {_bar(pressures.min())}, which are not absolute"
+        rule = f"has pressures down to {PRESSURE.text(pressures.min())}, which are not absolute"
         raise file.refused(rule, 'write gauge = true, or peg = { at = "-180 deg", to = "1 bar" } with what is known')
     with errors_at_key(f"{where}.file", table.file):
         return PressureTrace(tuple(angles.tolist()), tuple(pressures.tolist()), air, tuple(file.said))
@@ -273,10 +328,6 @@ def _within_cycle(angles: Array, pressures: Array, period: float) -> tuple[Array
     wrapped = np.mod(angles[:last] + 0.5 * period, period) - 0.5 * period
     order = np.argsort(wrapped)
     return wrapped[order], pressures[:last][order]
-
-
-def _bar(pressure: float, digits: int = 4) -> str:
-    return quantity_text(1e-5 * pressure, "bar", digits)
 
 
 def _finite(values: Array) -> Array:
@@ -361,9 +412,9 @@ def _chosen(file: RecordedFile, cycles: Array) -> Array:
     unlike = sum(_correlation(mean, cycle) < _UNLIKE for cycle in cycles)
     if unlike > _MANY * count:
         rule = f"has {counted(count, 'cycle')} that differ, and {unlike} of them are unlike their mean"
-        raise file.refused(rule, "check engine.cycle, or name one by pressure_column or cycles")
-    spread = _bar(peaks.std(ddof=1), 3)
-    which = f"Of {count} cycles, with peaks of {_bar(peaks.mean())} and a standard deviation of {spread}"
+        raise file.refused(rule, f"check engine.cycle, or name one by {file.records.name}_column or cycles")
+    spread, text = file.records.text(peaks.std(ddof=1), 3), file.records.text(peaks.mean())
+    which = f"Of {count} cycles, with peaks of {text} and a standard deviation of {spread}"
     if choice == "mean":
         file.said.append(f"{which}, the mean is used.")
         return mean

@@ -360,7 +360,7 @@ def _only_changed(engine: Engine, change: _Change) -> Engine:
     # the engine with the changed rotors and pistons as its only masses
     parts = (part.only({mass: 1.0 for name, mass in change.pistons if name == part.name})
              for part in engine.slider_cranks)  # fmt: skip
-    return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors)
+    return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors, load_torque=None)
 
 
 def _loads(

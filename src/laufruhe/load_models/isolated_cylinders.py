@@ -25,19 +25,22 @@ def massless_copy(part: SliderCrank) -> SliderCrank:
 
 
 def isolate_cylinder(engine: Engine, k: int, keep_places: bool, part: SliderCrank | None = None) -> Engine:
-    """Return the engine reduced to cylinder k, or to `part` in its place, without rotors.
+    """Return the engine reduced to cylinder k, or to `part` in its place, without rotors and load torque.
 
     The other cylinders stay as massless copies if `keep_places`.
     """
     active = engine.slider_cranks[k] if part is None else part
     with_idle = [active if j == k else massless_copy(idle) for j, idle in enumerate(engine.slider_cranks)]
-    return replace(engine, slider_cranks=tuple(with_idle) if keep_places else (active,), rotors=())
+    return replace(engine, slider_cranks=tuple(with_idle) if keep_places else (active,), rotors=(), load_torque=None)
 
 
 def isolate_rotors(engine: Engine, rotors: Sequence[Rotor], keep_places: bool) -> Engine:
-    """Return the engine reduced to some rotors; massless copies of the cylinders stay if `keep_places`."""
+    """Return the engine reduced to some rotors, without load torque.
+
+    Massless copies of the cylinders stay if `keep_places`.
+    """
     parts = tuple(map(massless_copy, engine.slider_cranks)) if keep_places else ()
-    return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
+    return replace(engine, slider_cranks=parts, rotors=tuple(rotors), load_torque=None)
 
 
 def split_by_bank(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:

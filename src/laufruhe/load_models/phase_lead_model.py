@@ -14,6 +14,7 @@ from operator import add
 import numpy as np
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.machine import CRANKSHAFT
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, common_base
@@ -190,7 +191,10 @@ class PhaseLeadModel:
 
 
 def problem_of_shafts(problem: Problem, is_included: Callable[[str], bool]) -> Problem:
-    """Return the problem with only those parts of the engine that are on shafts whose name `is_included` accepts."""
+    """Return the problem with only those parts of the engine that are on shafts whose name `is_included` accepts.
+
+    The load is on the crankshaft.
+    """
     engine = problem.engine
     parts = tuple(part for part in engine.slider_cranks if is_included(part.shaft.name))
     # other rotors stay without unbalance, so that every decision keeps its column
@@ -200,4 +204,6 @@ def problem_of_shafts(problem: Problem, is_included: Callable[[str], bool]) -> P
         replace(d, drives=tuple(v if v.rotor in included else replace(v, gain=0.0) for v in d.rotor_drives))
         for d in problem.unbalances
     ]
-    return replace(problem, engine=replace(engine, slider_cranks=parts, rotors=rotors), decisions=tuple(decisions))
+    load = engine.load_torque if is_included(CRANKSHAFT.name) else None
+    reduced = replace(engine, slider_cranks=parts, rotors=rotors, load_torque=load)
+    return replace(problem, engine=reduced, decisions=tuple(decisions))

@@ -122,7 +122,7 @@ class ThrowWaves:
     parts
         Cylinders and unbalances that turn with the throws.
     rest
-        Loads of the rotors that turn with no throw, affine in the unbalances.
+        Loads of the rotors that turn with no throw and of the load torque, affine in the unbalances.
     times
         Orders of crank speed that are kept.
     base
@@ -161,8 +161,8 @@ class ThrowWaves:
         )
         inside = any(measure.is_inside for measure in problem.measures)
         self.parts = [*self._cylinders(inside), *self._unbalances(rotor_throws, inside)]
-        rest = replace(motored(problem), engine=isolate_rotors(engine, remaining, inside))
-        self.rest = AffineModel(rest, keep_all=True)
+        rest = replace(isolate_rotors(engine, remaining, inside), load_torque=engine.load_torque)
+        self.rest = AffineModel(replace(motored(problem), engine=rest), keep_all=True)
         # unbalances on the throws turn in order 1
         loads = [measure for measure in problem.measures if measure.is_load]
         self.times = tuple(sorted({Fraction(1)}.union(*map(self._kept_orders, loads))))
@@ -170,7 +170,8 @@ class ThrowWaves:
         self.orders = np.array([[float(order) for order in wave] for wave in waves])
         self._place_of = {wave: place for place, wave in enumerate(waves)}
         self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in remaining]
-        self.base = common_base([order for order in (*self.times, *self._turning, Fraction(1)) if order])
+        loaded = [engine.cycle.base_order] if engine.load_torque is not None else []
+        self.base = common_base([order for order in (*self.times, *self._turning, *loaded, Fraction(1)) if order])
         self.rest.base = self.base
 
     def _cylinders(self, inside: bool) -> Iterator[MovingPart]:

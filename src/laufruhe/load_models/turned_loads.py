@@ -97,6 +97,10 @@ def turned_loads(
         [load_of_cylinder(k, bank) for bank in (BANK_SAMPLES if banks_are_open else (part.bank,))]
         for k, part in enumerate(engine.slider_cranks)
     ]
+    if engine.load_torque is not None:
+        fixed = replace(isolate_rotors(engine, (), keep_places), load_torque=engine.load_torque)
+        cylinders.append([load(motored(at_point), fixed)] * len(cylinders[0]))
+        angles = [*angles, (0.0, 0.0)]
     units = [
         [
             load(motored(at_point), isolate_rotors(engine, [replace(rotor, unbalance=u)], keep_places))

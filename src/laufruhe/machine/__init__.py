@@ -6,6 +6,7 @@ from laufruhe.machine.chambers import Chamber, Chambers, GasModel, Pump, Steam
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.flywheel import Arms, Flywheel, Rim
 from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, TrappedCharge, Wiebe
+from laufruhe.machine.load_torque import LoadTorque
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Bearing, GearedInertia, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
@@ -23,6 +24,7 @@ __all__ = [
     "Flywheel",
     "GasModel",
     "GearedInertia",
+    "LoadTorque",
     "Mount",
     "OperatingPoint",
     "PressureTrace",

@@ -18,6 +18,7 @@ from laufruhe.machine.chambers import GasModel
 from laufruhe.machine.extra import Extra
 from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.machine.flywheel import Flywheel
+from laufruhe.machine.load_torque import LoadTorque
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Bearing, GearedInertia, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
@@ -92,6 +93,8 @@ class Engine:
         Static loads under which the block moves on its mounts.
     extras
         Parts that extensions add, one of a class.
+    load_torque
+        Torque of the driven machine over the crank angle; None if it is constant.
     """
 
     name: str
@@ -105,6 +108,7 @@ class Engine:
     geared: tuple[GearedInertia, ...] = ()
     load_cases: tuple[LoadCase, ...] = ()
     extras: tuple[Extra, ...] = ()
+    load_torque: LoadTorque | None = None
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings", "geared"):

@@ -30,14 +30,19 @@ def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: Array, pace: float 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
     neighbours: a jump does not ring.
     """
+    return periodic_cubics(np.array(gas.angles), np.array(gas.pressures), cycle, angles, pace)
+
+
+def periodic_cubics(points: Array, heights: Array, cycle: Cycle, angles: Array, pace: float = 1.0) -> Array:
+    """Return values at crank angles [rad] from the heights at points of one cycle over `pace` (G12)."""
     # imported late, as it takes longer than all the rest of a small problem
     from scipy.interpolate import PchipInterpolator
 
     period = cycle.angle / pace
-    points, pressures = _one_period(np.array(gas.angles), np.array(gas.pressures), cycle, period)
+    points, heights = _one_period(points, heights, cycle, period)
     # a slope needs two neighbours on either side
     around = np.concatenate([points[-3:] - period, points, points[:3] + period])
-    values = np.concatenate([pressures[-3:], pressures, pressures[:3]])
+    values = np.concatenate([heights[-3:], heights, heights[:3]])
     local = points[0] + np.mod(angles - points[0], period)
     return np.asarray(PchipInterpolator(around, values)(local))
 

@@ -24,7 +24,7 @@ from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.rigid_body import plane_parts
 from laufruhe.physics.star_loads import order_index, star_loads
-from laufruhe.physics.torque import crank_torque
+from laufruhe.physics.torque import excess_torque
 from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
 
 _Parts: TypeAlias = tuple[complex, ...]
@@ -85,7 +85,7 @@ def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity
     """Return the loads of the geared inertia of an engine, at even or uneven speed (L8, F5)."""
     if fidelity.has_uneven_speed:
         return uneven_geared_loads(engine, point, fidelity)
-    return geared_moment(engine, crank_torque(engine, point, fidelity))
+    return geared_moment(engine, excess_torque(engine, point, fidelity))
 
 
 def added_rotor_loads(

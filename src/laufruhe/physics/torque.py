@@ -3,8 +3,9 @@
     T = -A (p - p_crankcase) ds/dphi - (1/2) w^2 dJ/dphi                     (T1; textbook eqs. 18 to 20)
 
 with J the inertia of pistons and rods reduced to the crank (F3): what they store, they take from the torque. The load
-takes its mean; the rest goes into the flywheel and comes back, and what has to be stored is the largest less the
-smallest of its integral (T2; textbook 2.7, example 4). The degree of irregularity is exact at every inertia,
+takes its mean, and has an alternating torque of its own if it is not constant (T12). The rest goes into the flywheel
+and comes back, and what has to be stored is the largest less the smallest of its integral (T2; textbook 2.7, example
+4). The degree of irregularity is exact at every inertia,
 
     w^2 = 2 (E + W) / (J_0 + J),   mean of w_0 / w over the angle = 1        (T3, T4)
 
@@ -27,10 +28,11 @@ from laufruhe.numerics.roots import rising_root
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, reduced, resolved_orders, two_order_roll
 from laufruhe.physics.rigid_body import ROLL
 from laufruhe.physics.star_loads import star_loads
-from laufruhe.physics.uneven_speed import gas_torque, moving_inertia, start_energy
+from laufruhe.physics.uneven_speed import driving_torque, moving_inertia, start_energy
 
 FINE_WORK = 8
 """Times as many steps as the fidelity has, at which the work is compared."""
@@ -57,12 +59,21 @@ class TorqueFacts:
 
 
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
-    """Return the torque of gas, of pistons and rods as point masses, of the rods' inertia, and of all (T1)."""
+    """Return the torque of gas, of pistons and rods as point masses, of the rods' inertia, and of all (T1).
+
+    A load that is not constant comes last (T12).
+    """
     total, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
     masses = crank_torque(engine, still, fidelity)
     points = crank_torque(engine, still, replace(fidelity, rod="mass-only"))
     gas, rods = total + masses.mapped(np.negative), masses + points.mapped(np.negative)
-    return {"gas": gas, "pistons": points, "rods": rods, "all": total}
+    parts = {"gas": gas, "pistons": points, "rods": rods, "all": total}
+    if engine.load_torque is not None:
+        mean = Spectrum(total.base, total.coefficients[:1])
+        parts["load"] = mean + less_load(Spectrum(total.base, 0.0 * mean.coefficients), engine, fidelity).mapped(
+            np.negative
+        )
+    return parts
 
 
 def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> TorqueFacts:
@@ -75,7 +86,7 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     uneven = None if inertia is None else swing_of(engine, point, fidelity).irregularity(inertia)
     return TorqueFacts(
         mean, mean * point.speed, float(values.min()), float(values.max()),
-        float(np.ptp(torque.integral.sample(FINE_WORK * fidelity.samples))), uneven,
+        float(np.ptp(excess_torque(engine, point, fidelity).integral.sample(FINE_WORK * fidelity.samples))), uneven,
     )  # fmt: skip
 
 
@@ -87,6 +98,11 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     )
     total = masses if gas is None else masses + fidelity.truncated(gas_loads(engine, gas, fidelity))
     return total.mapped(lambda wrench: wrench @ ROLL)
+
+
+def excess_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Return the torque of the crank less the alternating torque of the load, shape (n,) [N m] (T12)."""
+    return less_load(crank_torque(engine, point, fidelity), engine, fidelity)
 
 
 def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
@@ -185,7 +201,7 @@ def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) 
 
 @lru_cache(maxsize=64)
 def _compute_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Swing:
-    torque, steps = gas_torque(engine, point, fidelity), FINE_SPEED * fidelity.samples
+    torque, steps = driving_torque(engine, point, fidelity), FINE_SPEED * fidelity.samples
     angles = engine.cycle.angle * np.arange(steps) / steps
     work = torque.integral
     mean, (steady, bent) = float(torque.coefficients[0].real), (angles, torque.kink_angles)

@@ -22,6 +22,7 @@ from laufruhe.numerics.spectrum import Spectrum, spectrum_of, spectrum_with_kink
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_factor
+from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.mechanism import cylinder_wrench, reduced
 from laufruhe.physics.rigid_body import ROLL, plane_wrench
 
@@ -68,7 +69,7 @@ class _Turning:
 
 
 def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
-    """Return the motion under gas and inertia torque against a constant load, at equal time steps (F2-F4)."""
+    """Return the motion under gas, inertia and load torque, at equal time steps (F2-F4)."""
     return _turning(engine, point, fidelity).at(_steps(engine, fidelity))
 
 
@@ -83,7 +84,7 @@ def _turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turn
 
 @lru_cache(maxsize=32)
 def _compute_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
-    phi, torque = _steps(engine, fidelity), gas_torque(engine, point, fidelity)
+    phi, torque = _steps(engine, fidelity), driving_torque(engine, point, fidelity)
     # F2: the load takes the mean of the torque
     torque = torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
     work, (inertia, _) = torque.integral.sample(fidelity.samples), _inertia(engine, fidelity, phi)
@@ -155,6 +156,11 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
     if gas is None:
         return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
     return gas_loads(engine, gas, fidelity).mapped(lambda loads: loads[:, 3])
+
+
+def driving_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    """Return the torque of the gas less the alternating torque of the load over the crank angle [N m] (T12)."""
+    return less_load(gas_torque(engine, point, fidelity), engine, fidelity)
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.static_cases import settled
-from laufruhe.physics.torque import Swing, crank_torque, swing_of, turning_inertia
+from laufruhe.physics.torque import Swing, crank_torque, excess_torque, swing_of, turning_inertia
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
@@ -508,6 +508,10 @@ def _crank_torque(moving_parts: Engine, point: OperatingPoint, fidelity: Fidelit
     return crank_torque(moving_parts, point, fidelity).mapped(lambda values: values[:, None, None])
 
 
+def _stored_work(moving_parts: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    return excess_torque(moving_parts, point, fidelity).integral.mapped(lambda values: values[:, None, None])
+
+
 def _of_places(
     name: str, sides: tuple[str, ...], span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]]
 ) -> Channel:
@@ -541,7 +545,7 @@ MAIN_BEARING_PRESSURE = crankcase_channel(
 )
 HAMMER_BLOW = crankcase_channel("hammer blow", "N", OF_EACH_BEARING, bearings.hammer_blows)
 CRANK_TORQUE = crankcase_channel("crank torque", "N m", _ON_CRANK, _crank_torque)
-STORED_WORK = crankcase_channel("stored work", "J", _ON_CRANK, lambda *at: _crank_torque(*at).integral)
+STORED_WORK = crankcase_channel("stored work", "J", _ON_CRANK, _stored_work)
 CRANK_PIN_FORCE = crankcase_channel("crank-pin force", "N", AT_EACH_CRANK_PIN, bearings.pin_forces)
 CRANK_PIN_PRESSURE = crankcase_channel(
     "crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, bearings.pin_forces, bearings.crank_pin_factors

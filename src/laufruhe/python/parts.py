@@ -184,12 +184,12 @@ class EngineParts(Parts):
 
     def gas_trace(
         self, *, file: str, single_cylinders: Sequence[Table] | None = None, chambers: Sequence[Table] | None = None,
-        sheet: str | None = None, angle_column: str | int | None = None,
-        pressure_column: str | int | Sequence[str | int] | None = None, angle_unit: str | None = None,
-        pressure_unit: str | None = None, gauge: bool | None = None, peg: Table | None = None,
+        sheet: str | None = None, angle_column: str | int | None = None, angle_unit: str | None = None,
         cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
-        angle_zero: Number | None = None, crankcase_pressure: Value | None = None,
-        cylinder_columns: Sequence[str | int] | None = None, cylinder_angles: Literal["own", "common"] | None = None,
+        pressure_column: str | int | Sequence[str | int] | None = None, pressure_unit: str | None = None,
+        gauge: bool | None = None, peg: Table | None = None, angle_zero: Number | None = None,
+        crankcase_pressure: Value | None = None, cylinder_columns: Sequence[str | int] | None = None,
+        cylinder_angles: Literal["own", "common"] | None = None,
     ) -> Self:
         """Return the engine with gas trace.
 
@@ -198,7 +198,7 @@ class EngineParts(Parts):
         Parameters
         ----------
         file
-            Text file, .xlsx or .mat file of crank angle and pressure, beside the problem.
+            Text file, .xlsx or .mat file beside the problem: crank angle, and values over it.
         single_cylinders
             Cylinders whose gas differs; missing keys are those of [gas].
         chambers
@@ -207,20 +207,20 @@ class EngineParts(Parts):
             Sheet of a spreadsheet; by default that with the most rows of numbers.
         angle_column
             Name or number of the column of crank angles, if it is not evident.
-        pressure_column
-            Name or number of the column of pressures, or several that are cycles of the cylinder.
         angle_unit
             Unit of the angles, if it is not in the file; deg by default.
+        cycles
+            Of several cycles: their mean, the one with the highest peak, or that with this number.
+        smooth
+            false keeps the noise of the measurement.
+        pressure_column
+            Name or number of the column of pressures, or several that are cycles of the cylinder.
         pressure_unit
             Unit of the pressures, if it is not in the file; bar by default.
         gauge
             true: pressures count from crankcase_pressure. By default they are absolute.
         peg
             Moves a floating pressure to a known one, at one angle.
-        cycles
-            Of several cycles: their mean, the one with the highest pressure, or that with this number.
-        smooth
-            false keeps the noise of the measurement.
         angle_zero
             Crank angle after firing at which the file counts zero, or its dead centre: "firing" or "gas exchange".
         crankcase_pressure
@@ -384,6 +384,39 @@ class EngineParts(Parts):
             Coefficient of friction; needed for friction power.
         """
         return self._with("main_bearings", "main_bearing", keys_of(locals()))
+
+    def load_torque(
+        self, *, file: str, sheet: str | None = None, angle_column: str | int | None = None,
+        angle_unit: str | None = None, cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
+        torque_column: str | int | Sequence[str | int] | None = None, torque_unit: str | None = None,
+        angle_zero: Value | None = None,
+    ) -> Self:
+        """Return the engine with load torque.
+
+        Torque of the driven machine over the crank angle, in place of a constant one.
+
+        Parameters
+        ----------
+        file
+            Text file, .xlsx or .mat file beside the problem: crank angle, and values over it.
+        sheet
+            Sheet of a spreadsheet; by default that with the most rows of numbers.
+        angle_column
+            Name or number of the column of crank angles, if it is not evident.
+        angle_unit
+            Unit of the angles, if it is not in the file; deg by default.
+        cycles
+            Of several cycles: their mean, the one with the highest peak, or that with this number.
+        smooth
+            false keeps the noise of the measurement.
+        torque_column
+            Name or number of the column of torques, or several that are cycles of the machine.
+        torque_unit
+            Unit of the torques, if it is not in the file; N m by default.
+        angle_zero
+            Crank angle at which the file counts zero, after the firing dead centre of cylinder 1 [rad].
+        """
+        return self._with("load_torque", "load_torque", keys_of(locals()))
 
     def flywheel(
         self, *, inertia: Value | None = None, rim: Table | None = None, crankshaft_inertia: Value | None = None,

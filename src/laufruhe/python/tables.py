@@ -427,37 +427,37 @@ def pump(
 
 
 def recorded(
-    *, file: str, sheet: str | None = None, angle_column: str | int | None = None,
-    pressure_column: str | int | Sequence[str | int] | None = None, angle_unit: str | None = None,
-    pressure_unit: str | None = None, gauge: bool | None = None, peg: Table | None = None,
+    *, file: str, sheet: str | None = None, angle_column: str | int | None = None, angle_unit: str | None = None,
     cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
+    pressure_column: str | int | Sequence[str | int] | None = None, pressure_unit: str | None = None,
+    gauge: bool | None = None, peg: Table | None = None,
 ) -> Table:
     """Return a table `recorded`.
 
-    A recorded trace, as test benches and simulations write it: a text file, an .xlsx or a .mat file.
+    A recorded trace of pressure.
 
     Parameters
     ----------
     file
-        Text file, .xlsx or .mat file of crank angle and pressure, beside the problem.
+        Text file, .xlsx or .mat file beside the problem: crank angle, and values over it.
     sheet
         Sheet of a spreadsheet; by default that with the most rows of numbers.
     angle_column
         Name or number of the column of crank angles, if it is not evident.
-    pressure_column
-        Name or number of the column of pressures, or several that are cycles of the cylinder.
     angle_unit
         Unit of the angles, if it is not in the file; deg by default.
+    cycles
+        Of several cycles: their mean, the one with the highest peak, or that with this number.
+    smooth
+        false keeps the noise of the measurement.
+    pressure_column
+        Name or number of the column of pressures, or several that are cycles of the cylinder.
     pressure_unit
         Unit of the pressures, if it is not in the file; bar by default.
     gauge
         true: pressures count from crankcase_pressure. By default they are absolute.
     peg
         Moves a floating pressure to a known one, at one angle.
-    cycles
-        Of several cycles: their mean, the one with the highest pressure, or that with this number.
-    smooth
-        false keeps the noise of the measurement.
     """
     return keys_of(locals())
 

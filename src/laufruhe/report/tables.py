@@ -18,7 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.processes import run_concurrently
 from laufruhe.physics.bearing_loads import wear_of
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.torque import swing_of, torque_parts, turning_inertia
+from laufruhe.physics.torque import excess_torque, swing_of, torque_parts, turning_inertia
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.present.curves import (
     KINDS,
@@ -156,7 +156,7 @@ def _torque(result: Result) -> Table:
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: Array) -> dict[str, Array]:
     # a crank that would stop has no speed
     parts = torque_parts(engine, point, fidelity)
-    work = parts["all"].integral.values(angles)
+    work = excess_torque(engine, point, fidelity).integral.values(angles)
     columns = {f"torque of {part} [N m]": torque.values(angles) for part, torque in parts.items()}
     columns["work stored [J]"] = work - work.min()
     swing, inertia = swing_of(engine, point, fidelity), turning_inertia(engine, fidelity)

@@ -76,6 +76,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
         ),
         bearings=tuple(bearing.scaled(k) for bearing in problem.engine.bearings),
         extras=tuple(extra.scaled(k, m) for extra in problem.engine.extras),
+        load_torque=problem.engine.load_torque and problem.engine.load_torque.scaled(1.0 / scale.speed),
         mounts=tuple(
             mount.mapped(
                 lambda part: replace(part, position=(k * part.position[0], k * part.position[1], k * part.position[2]))

@@ -27,6 +27,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.exact_angles import as_turn, phasors
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.torque import cylinder_torque
 
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
@@ -199,7 +200,9 @@ def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
 
 
 def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the torque of gas, pistons and rods on every disc, shape (n, discs) [N m] (T1).
+    """Return the torque of gas, pistons, rods and load on every disc, shape (n, discs) [N m] (T1, T12).
+
+    The load acts at crank speed, on the disc where the driven machine takes its torque.
 
     An uneven crank speed, or a cylinder on another shaft, raises `ModelError`.
     """
@@ -210,8 +213,14 @@ def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
             raise ModelError(
                 f"the throw of {part.name} is on shaft '{part.shaft.name}'; twist is modelled for one crankshaft only"
             )
-    driven = tuple(disc.cylinders for disc in chain_of(engine).discs)
-    return _throw_torques(engine.cycle, engine.slider_cranks, driven, point, fidelity)
+    chain = chain_of(engine)
+    driven = tuple(disc.cylinders for disc in chain.discs)
+    torques = _throw_torques(engine.cycle, engine.slider_cranks, driven, point, fidelity)
+    if engine.load_torque is None:
+        return torques
+    zero = Spectrum(torques.base, np.zeros(1, dtype=complex))
+    at_output = np.arange(len(driven)) == chain.driven
+    return torques + less_load(zero, engine, fidelity).mapped(lambda values: values[:, None] * at_output)
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""Tangential-force diagram: torque of gas, pistons and rods, stored work, and crank speed."""
+"""Tangential-force diagram: torque of gas, pistons, rods and load, stored work, and crank speed."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from matplotlib.ticker import MultipleLocator
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, torque_parts, turning_inertia
-from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, Series, entry, finish_page, page, series_of, styled
+from laufruhe.physics.torque import TorqueFacts, excess_torque, swing_of, torque_facts, torque_parts, turning_inertia
+from laufruhe.plots.style import GREEN, ORANGE, PALE, PURPLE, SKY, Series, entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
 from laufruhe.present.measures import has_loads, uses_torque
 from laufruhe.present.numbers import RPM, number
@@ -23,7 +23,7 @@ from laufruhe.solvers.result import Result
 Unit: TypeAlias = tuple[float, str]
 STEPS, MAX_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
-COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK}
+COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK, "load": PURPLE}
 # smallest drawn part, and smallest drawn order, relative to the largest
 MIN_PART, MIN_ORDER = 1e-3, 1e-2
 _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}
@@ -53,7 +53,7 @@ def figure(result: Result) -> Figure:
     drawn.panels[-1].set_position((box.x0, box.y0 - 0.5 / high, box.width, box.height))
     unit = in_thousands(largest, "N m")
     _torque(drawn.panels[0], visible, degrees, facts[k].mean, unit)
-    _work(drawn.panels[1], parts["all"], degrees, facts[k])
+    _work(drawn.panels[1], excess_torque(engine, points[k], fidelity), degrees, facts[k])
     if has_speed:
         turning = _speed(drawn.panels[2], result, k, degrees)
     for axes in drawn.panels[:-1]:

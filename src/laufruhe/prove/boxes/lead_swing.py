@@ -22,7 +22,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import curvature
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.torque import FINE_SPEED, turning_inertia
-from laufruhe.physics.uneven_speed import gas_torque, moving_inertia, start_energy
+from laufruhe.physics.uneven_speed import driving_torque, moving_inertia, start_energy
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
@@ -57,7 +57,7 @@ class LeadSwing:
             if measure.includes_point(point):
                 parts = []
                 for engine in engines:
-                    torque = gas_torque(engine, point, fidelity)
+                    torque = driving_torque(engine, point, fidelity)
                     swing = spectrum_of(moving_inertia(engine, fidelity, angles)[0], engine.cycle.base_order)
                     slope = float(np.abs(swing.coefficients[1:] * swing.orders[1:]).sum())
                     parts.append(_Part(torque.integral, swing, largest_torque(torque), slope))

@@ -50,14 +50,15 @@ def work_for_bounds(problem: Problem, value: float) -> Callable[[Problem], Probl
     bounds, initial = _bounds(problem), evaluate(problem)
     # the bound of the degree needs all orders of the pistons
     is_exact = problem.fidelity.kinematics == "exact" and problem.fidelity.orders is None
-    cylinder_evaluations = [
-        evaluate(problem, replace(problem.engine, slider_cranks=(part,), rotors=()))
-        for part in problem.engine.slider_cranks
-    ]
+    alone = replace(problem.engine, rotors=(), load_torque=None)
+    evaluations = [evaluate(problem, replace(alone, slider_cranks=(part,))) for part in problem.engine.slider_cranks]
+    if problem.engine.load_torque is not None:
+        load = replace(alone, slider_cranks=(), load_torque=problem.engine.load_torque)
+        evaluations.append(evaluate(problem, load))
     slopes: dict[tuple[Measure, str], float] = {}
     for term in problem.objective:
         for name in _points(problem, term.measure) if term.measure.channel.depends_on_torque else ():
-            maximum = sum(_stored(evaluation, name) for evaluation in cylinder_evaluations)
+            maximum = sum(_stored(evaluation, name) for evaluation in evaluations)
             if value < math.inf and term.weight > 0.0:
                 maximum = min(maximum, bounds[name].work(value / term.weight))
             slopes[term.measure, name] = bounds[name].degree(maximum) / maximum if maximum > 0.0 and is_exact else 0.0
