@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar, Union
 
 from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError, check_integer, wrong_call
+from laufruhe.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +60,6 @@ _ELSEWHERE = {
 }
 _MODULES = {"machine": "laufruhe.machine", "plots": "laufruhe.plots", "tables": "laufruhe.python.tables"}
 
-__version__ = "0.3.0"
 __all__ = [
     "EngineDraft",
     "InputError",

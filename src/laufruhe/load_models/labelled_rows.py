@@ -132,7 +132,7 @@ def labelled_rows(model: AffineModel, measure: Measure, samples: int) -> xr.Data
 def row_axes(model: AffineModel, measure: Measure, norm: AffineNorm, samples: int) -> dict[str, Any]:
     """Return the labels of the rows (k, d) of a measure by dimension, in the order of their storage."""
     (k, d), engine = norm.constant.shape, model.problem.engine
-    if not isinstance(measure.channel, LoadChannel) or measure in model.problem.known_rows:
+    if not measure.is_load or measure in model.problem.known_rows:
         names = [rotor.name for rotor in counted_rotors(measure, engine.rotors)] if measure.is_mass else []
         return {"part": _labels(names, k), "component": list(range(d))}
     steps, points = norm.grid.steps, norm.grid.points

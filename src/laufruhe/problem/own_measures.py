@@ -115,7 +115,7 @@ def own_measure(
         If a name is unknown.
     """
     listed: object = name
-    if not isinstance(listed, str) or not name.strip() or name in CHANNELS or name in NORMS:
+    if not isinstance(listed, str) or not name.strip() or CHANNELS.get(name) or NORMS.get(name):
         raise wrong_call("name", name, "is no new name", "give one that no quantity and no norm has")
     if curvature not in ("convex", "affine", "unknown"):
         raise wrong_call("curvature", curvature, "is unknown", "write convex, affine or unknown")
@@ -123,17 +123,18 @@ def own_measure(
     channel = _linear_channel(name, load, source, unit) if callable(load) else source
     if callable(norm):
         return Measure(channel, OwnNorm(name, norm, curvature))
-    if norm not in NORMS:
+    known = NORMS.get(norm)
+    if known is None:
         raise wrong_call("norm", norm, "is no norm", f"give a function, or one of {', '.join(NORMS)}")
-    return Measure(channel, NORMS[norm])
+    return Measure(channel, known)
 
 
 def _channel(where: str, name: object) -> LoadChannel:
     channel = CHANNELS.get(name) if isinstance(name, str) else None
-    if not isinstance(channel, LoadChannel):
+    if channel is None or not channel.is_load:
         loads = ", ".join(key for key, entry in CHANNELS.items() if entry.is_load)
         raise wrong_call(where, name, "is no load", f"give a function, or one of {loads}")
-    return channel
+    return Measure(channel).load
 
 
 def _linear_channel(name: str, function: Callable[[Array], Array], of: LoadChannel, unit: str) -> LoadChannel:

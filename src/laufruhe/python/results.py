@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.live import live_model
 from laufruhe.numerics.budget import stoppable
 from laufruhe.present.pictures import PICTURES
 from laufruhe.problem.problem import Problem
@@ -74,21 +73,9 @@ class Result(solved.Result):
 
     def report(self, path: str | Path) -> None:
         """Write the report with its pictures: a page if the path ends in .html, or Markdown with pictures beside it."""
-        from laufruhe import plots
-        from laufruhe.report.result_report import result_document
-        from laufruhe.report.web_page import as_html
+        from laufruhe.python.report_file import write_report
 
-        place = Path(path)
-        document = result_document(self, list(PICTURES), "laufruhe in Python")
-        is_page = place.suffix in (".html", ".htm")
-        pictures = {name: plots.as_svg(figure) for name, figure in plots.figures(self)}
-        document = document.showing(pictures)
-        if is_page:
-            files.write(place, as_html(document, pictures, live_model(self.problem, self)))
-            return
-        files.write(place, document.as_markdown(".svg"))
-        for name, svg in pictures.items():
-            files.write(place.with_name(f"{name}.svg"), svg)
+        write_report(self, Path(path))
 
 
 def python_result(result: solved.Result, history: tuple[Progress, ...] = ()) -> Result:

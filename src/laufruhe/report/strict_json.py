@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-import laufruhe
 from laufruhe.numerics.libraries import library_versions
+from laufruhe.version import __version__
 
 MADE_BY = {"made_by": "laufruhe"}
 _BEGIN = re.compile(rb'(\[\s*)?{\s*"made_by": "laufruhe"')
@@ -22,7 +22,7 @@ LONGEST_BEGIN = 200
 
 def versions() -> dict[str, str]:
     """Return the versions of everything that numbers depend on, by name."""
-    return {"laufruhe": laufruhe.__version__, **library_versions()}
+    return {"laufruhe": __version__, **library_versions()}
 
 
 def is_ours(path: Path) -> bool:
