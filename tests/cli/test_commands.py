@@ -238,7 +238,8 @@ def test_the_tolerance_is_used(here: Path) -> None:
     run("solve", written(here, scenes.TIGHT), "--tolerance", "1e-2", "--no-plots")
     record = json.loads((here / "results/scene/result.json").read_text(encoding="utf-8"))
     assert record["status"] == "optimal"
-    assert "--tolerance 0.01" in (here / "results/scene/report.md").read_text(encoding="utf-8")
+    report = (here / "results/scene/report.md").read_text(encoding="utf-8")
+    assert "\nlaufruhe solve scene.toml --no-plots --tolerance 0.01\n" in report
 
 
 class TestUnwritable:

@@ -98,12 +98,26 @@ def test_the_report_holds_everything() -> None:
     assert text.startswith("# Four in line\n")
     assert "](polar.png)" in text
     assert "spectrum.png" not in text
-    for part in ("Result", "Decisions", "Limits", "Mount forces", "Orders", "Proof", "Fidelity", "Reproduce"):
+    for part in ("Result", "Decisions", "Limits", "Mount forces", "Orders", "Proof", "Fidelity", "Inputs", "Reproduce"):
         assert f"\n## {part}" in text
     assert "laufruhe solve scene.toml" in text
     assert "numpy" in text
     widths = [line.count(" | ") for line in text.splitlines() if line.startswith("| left.unbalance")]
     assert widths == [5]
+
+
+def test_a_page_alone_holds_the_problem() -> None:
+    """The file in the report gives the same problem again, and the tables give its numbers."""
+    result = solved("tractor-four-lanchester")
+    text = result_document(result, (), "laufruhe solve").as_markdown(".png")
+    copy = laufruhe.load(text.partition("```toml\n")[2].partition("```")[0])
+    assert copy.engine == result.problem.engine
+    rows = {
+        cells[1]: cells[2:-1] for line in text.splitlines() if len(cells := [c.strip() for c in line.split("|")]) > 3
+    }
+    assert rows["firing order"] == ["1-3-4-2, after 180, 180, 180, 180 deg"]
+    assert rows["rotation"] == ["clockwise"]
+    assert rows["cylinder 3"] == ["-62.5", "0", "180", "180", "100", "120", "230.77", "0", "1.25", "0"]
 
 
 def test_source_and_assumptions_are_told() -> None:

@@ -102,7 +102,7 @@ def test_both_pages_say_the_same() -> None:
     for line in result_document(result, (), "laufruhe solve scene.toml").as_markdown("").splitlines():
         for cell in line.strip("| ").split(" | "):
             told = re.sub(r"\\(.)", r"\1", cell).lstrip("#- ").strip()
-            if told and not set(told) <= set("-:| `sh"):
+            if told and not told.startswith("```") and not set(told) <= set("-:| "):
                 assert told in words, told
 
 

@@ -26,6 +26,7 @@ from laufruhe.cli.screen import (
     FAILED,
     INTERRUPTED,
     Request,
+    command_line,
     complain,
     exit_statuses,
     handing_out,
@@ -154,6 +155,7 @@ def engines(
     epilog=o.examples("laufruhe solve problem.toml", "laufruhe solve problem.toml --time-limit 60 --json result.json")
 )
 def solve(
+    context: typer.Context,
     problem: o.ProblemArgument,
     json: o.JsonOption = None,
     out: o.OutOption = None,
@@ -176,11 +178,13 @@ def solve(
     with exit_statuses(problem), spoken(quiet, verbose), resources(time_limit, scheduler), artist(kinds) as ask:
         from laufruhe.cli.solve import run, solve
 
-        run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series, solver), solve)
+        command = command_line(context)
+        run(Request("solve", problem, json, out, kinds, ask, command, animate, tolerance, series, solver), solve)
 
 
 @app.command(epilog=o.examples("laufruhe evaluate problem.toml --series --json -"))
 def evaluate(
+    context: typer.Context,
     problem: o.ProblemArgument,
     json: o.JsonOption = None,
     out: o.InitialOutOption = None,
@@ -199,11 +203,13 @@ def evaluate(
     with exit_statuses(problem), spoken(quiet, verbose), artist(kinds) as ask:
         from laufruhe.cli.solve import evaluate, run
 
-        run(Request("evaluate", problem, json, out, kinds, ask, animate, series=series), evaluate)
+        command = command_line(context)
+        run(Request("evaluate", problem, json, out, kinds, ask, command, animate, series=series), evaluate)
 
 
 @app.command(epilog=o.examples("laufruhe study tractor-sweeps.toml --jobs 4"))
 def study(
+    context: typer.Context,
     problem: o.StudyArgument,
     json: o.StudyJsonOption = None,
     out: o.OutOption = None,
@@ -226,7 +232,7 @@ def study(
         from laufruhe.cli.study import run_study
 
         with progress() as say:
-            text, data = run_study(problem, out, jobs, say, ask, kind.kinds)
+            text, data = run_study(problem, out, jobs, say, ask, kind.kinds, command_line(context))
         hand_out(text, data)
 
 

@@ -39,7 +39,7 @@ Ask: TypeAlias = Callable[..., Callable[[], Any]]
 
 @dataclass(frozen=True)
 class Request:
-    """Arguments of `solve` and `evaluate`."""
+    """Arguments of `solve` and `evaluate`, and the command line that makes the same result again."""
 
     verb: str
     problem: Path
@@ -47,17 +47,23 @@ class Request:
     out: Path | None
     kinds: tuple[str, ...]
     ask: Ask
+    command: str
     animated: bool = False
     tolerance: float | None = None
     series: bool = False
     solver: str | None = None
 
-    @property
-    def command(self) -> str:
-        """Command line that makes the same result again."""
-        words = ["laufruhe", self.verb, str(self.problem), *(("--series",) if self.series else ())]
-        words += [] if self.tolerance is None else ["--tolerance", f"{self.tolerance:g}"]
-        return typed(*words, *([] if self.solver is None else ["--solver", self.solver]))
+
+def command_line(context: typer.Context) -> str:
+    """Return the command with its arguments and all options that the user gave."""
+    words = ["laufruhe", str(context.info_name)]
+    for parameter in context.command.params:
+        name, value = str(parameter.name), context.params[str(parameter.name)]
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            words += parameter.opts[:1] if parameter.param_type_name == "option" else []
+            words += [] if isinstance(value, bool) else [f"{value:g}" if isinstance(value, float) else str(value)]
+    return typed(*words)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from laufruhe.cli.screen import Ask, pace, typed
+from laufruhe.cli.screen import Ask, pace
 from laufruhe.errors import printed, refused
 from laufruhe.files.reader import display_path
 from laufruhe.numerics.cores import processors
@@ -21,11 +21,17 @@ from laufruhe.studies.stores import FINISHED_POINTS
 
 
 def run_study(
-    path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None], ask: Ask, kinds: Sequence[str]
+    path: Path,
+    out: Path | None,
+    jobs: int | None,
+    say: Callable[[str], None],
+    ask: Ask,
+    kinds: Sequence[str],
+    command: str,
 ) -> tuple[str, Callable[[], str]]:
     """Compute a study and write its files; return the message about them, and a function that returns it as JSON.
 
-    `ask` runs a function, here one that draws a picture, in another process.
+    `ask` runs a function, here one that draws a picture, in another process; `command` makes the study again.
     """
     if jobs is not None and jobs < 1:
         raise refused("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
@@ -36,7 +42,6 @@ def run_study(
     option, file_list = "--out" if out is not None else "results", file_names(study)
     with files.staged(files.FileSet(folder, option, "study", file_list, kept_names=[FINISHED_POINTS])) as stage:
         datasets, seconds = run(study, path.parent, points, _Progress(say), jobs or processors())
-        command = typed("laufruhe", "study", str(path))
 
         def draw(picture: Picture, place: Path) -> Callable[[], str]:
             return ask("laufruhe.plots.picture:save_picture", picture, place, kinds)

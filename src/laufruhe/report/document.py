@@ -65,13 +65,14 @@ class Illustration:
 
 @dataclass(frozen=True)
 class Code:
-    """A line to type."""
+    """Lines to type, or the text of a file."""
 
     text: str
+    language: str = "sh"
 
     def as_markdown(self) -> str:
-        """Return a block for a shell."""
-        return f"```sh\n{self.text}\n```"
+        """Return a block of code."""
+        return f"```{self.language}\n{self.text}\n```"
 
 
 Block: TypeAlias = Heading | Paragraph | Bullets | Illustration | Code | Table

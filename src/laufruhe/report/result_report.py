@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from laufruhe.present.pictures import PICTURES
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
+from laufruhe.report.inputs import input_tables
 from laufruhe.report.sections import tables_of
 from laufruhe.report.strict_json import versions
 from laufruhe.report.wording import details, explained, fidelity_of, headline
@@ -34,7 +35,12 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
     yield Paragraph(explained(result))
     yield Heading("Fidelity")
     yield Paragraph(fidelity_of(result))
+    yield Heading("Inputs")
+    yield from input_tables(problem, result.final.engine)
     yield Heading("Reproduce")
     yield Code(" ".join(command.split()))
+    if problem.origin is not None:
+        yield Paragraph("The problem file:")
+        yield Code(problem.to_toml().rstrip(), "toml")
     version_list = ", ".join(f"{name} {version}" for name, version in versions().items())
     yield Paragraph(f"Made with {version_list}.", marked=True)

@@ -1,0 +1,62 @@
+"""Inputs of a problem as a report states them, so that a reader can check them without the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from laufruhe.errors import counted
+from laufruhe.files.numbering import USUAL
+from laufruhe.machine import Engine, SliderCrank
+from laufruhe.machine.layouts import LAYOUTS
+from laufruhe.present.numbers import DASH, DEGREE, trimmed
+from laufruhe.present.tables import Table
+from laufruhe.problem.problem import Problem
+
+HEAD = (
+    "", "x [mm]", "bank [deg]", "throw [deg]", "fires at [deg]", "bore [mm]", "stroke [mm]", "rod [mm]", "offset [mm]",
+    "reciprocating mass [kg]", "rotating mass [kg]",
+)  # fmt: skip
+NOTE = "Throws at a crank angle of 0, the firing dead centre of cylinder 1 (C5). The offset is that of the pin's path."
+
+
+def input_tables(problem: Problem, engine: Engine) -> list[Table]:
+    """Return tables of the engine of a result: what it is, and the numbers of every cylinder."""
+    rows = list(_engine_rows(problem, engine))
+    cylinders = [_cylinder(part) for part in engine.slider_cranks]
+    return [Table(("input", "value"), rows, left=2), Table(HEAD, cylinders, note=NOTE)]
+
+
+def _engine_rows(problem: Problem, engine: Engine) -> Iterator[tuple[str, str]]:
+    tables = problem.origin.tables if problem.origin is not None else {}
+    table: Mapping[str, Any] = tables.get("engine", {})
+    kind = LAYOUTS.get(table.get("layout", ""))
+    fired = sorted(engine.cylinders, key=lambda part: part.firing_angle)
+    yield "engine", ", ".join([*([kind.name] if kind else []), str(engine.cycle), counted(len(fired), "cylinder")])
+    for key, usual in {**USUAL, "rotation": "clockwise"}.items():
+        if kind is not None and kind.takes(key):
+            yield key.replace("_", " "), f"{table.get(key, usual)}"
+    if len(fired) > 1:
+        order = "-".join(part.name.removeprefix(f"{part.noun} ") for part in fired)
+        intervals = ", ".join(trimmed(DEGREE * angle) for angle in engine.firing_intervals)
+        yield "firing order", f"{order}, after {intervals} deg"
+    if all(part.bore is not None for part in fired):
+        yield "displacement", f"{trimmed(1e3 * sum(part.piston_area * part.stroke for part in engine.slider_cranks))} l"
+    if "gas" in tables:
+        yield (
+            "gas",
+            ", ".join(f"{key} {value}" for key, value in tables["gas"].items() if isinstance(value, str | int | float)),
+        )
+    if engine.block is not None:
+        yield "mass on the mounts", f"{trimmed(engine.block.mass)} kg"
+
+
+def _cylinder(part: SliderCrank) -> tuple[str, ...]:
+    angles = (part.bank, part.throw, part.firing_angle)
+    lengths = (part.bore, part.stroke, part.rod_length, part.offset)
+    return (
+        part.name, trimmed(1e3 * part.x), *(trimmed(DEGREE * angle) for angle in angles),
+        *(DASH if length is None or math.isinf(length) else trimmed(1e3 * length, 5) for length in lengths),
+        trimmed(part.reciprocating_mass), trimmed(part.rotating_mass),
+    )  # fmt: skip
