@@ -21,7 +21,7 @@ from laufruhe.errors import ModelError
 GROUP = "laufruhe.extensions"
 Tables = Literal[
     "norms", "channels", "kinds", "layouts", "drives", "methods", "quantities", "provers", "reductions", "study_kinds",
-    "commands", "keys", "notes", "pictures", "sections",
+    "commands", "keys", "weight_keys", "notes", "pictures", "sections",
 ]  # fmt: skip
 
 
@@ -60,6 +60,8 @@ class Extension:
         Objects of `typer.models.CommandInfo`; `laufruhe --help` imports their modules, so these should import little.
     keys
         Objects of `laufruhe.files.problem_file.Key`: tables of a problem file.
+    weight_keys
+        Objects of `laufruhe.files.problem_file.WeightKey`: keys of counterweights and of unbalances of shafts.
     notes
         Objects of `laufruhe.files.problem_file.Note`: notes that a file may add to any number, such as tolerances.
     sections
@@ -82,6 +84,7 @@ class Extension:
     study_kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()
+    weight_keys: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     sections: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
@@ -94,7 +97,7 @@ _OF_SIZES = (
 )  # fmt: skip
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
-    "commands": {"page": "served_page"},
+    "commands": {"page": "served_page", "drawing": "workshop"},
     "keys": {
         "torsion": "torsion",
         "tolerances": "robust",
@@ -102,7 +105,9 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "assembly": "robust",
         "run_up": "run_ups",
         "running_gear": "sizes",
+        "crankcase": "workshop",
     },
+    "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "layouts": {"rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke"},

@@ -27,6 +27,7 @@ Loc: TypeAlias = tuple[str | int, ...]
 MAX_COMPLAINTS = 20
 """Largest number of complaints about a file at once."""
 _CLOSE = 0.6
+_WEIGHTS = ("counterweights", "balancer_shafts")
 _MAX_NAMED = 3
 _UNIT_SUFFIX = re.compile(r"_(mm|cm|m|kg|g|rpm|bar|deg|Nm|N)$")
 _TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
@@ -147,9 +148,10 @@ def nearest_file(path: Path, otherwise: str) -> str:
 
 def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: type[BaseModel]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
-    if kind == "extra_forbidden" and len(loc) == 1 and loc[0] in HOMES["keys"]:
-        return Complaint(where, "", *missing_extension(HOMES["keys"][str(loc[0])]))
     if kind == "extra_forbidden":
+        homes = HOMES["keys"] if len(loc) == 1 else HOMES["weight_keys"] if loc[0] in _WEIGHTS else {}
+        if str(loc[-1]) in homes:
+            return Complaint(where, "", *missing_extension(homes[str(loc[-1])]))
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
         remedy = _key_remedy(str(loc[-1]), keys, model)
         return Complaint(where, value_text(detail["input"]), "is not a key here", remedy)

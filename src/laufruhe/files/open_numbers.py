@@ -13,7 +13,7 @@ from typing import Any
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path, read_number
 from laufruhe.files.nested import Place, annotations_at, at, number_at, tables_on, walk, with_value_at
-from laufruhe.files.problem_file import EXTENSION_KEYS, Note, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, WEIGHT_KEYS, Note, file_model
 from laufruhe.files.rotors import FACTORS
 from laufruhe.files.study_tables import path_text
 from laufruhe.machine.layouts import LAYOUTS
@@ -77,7 +77,11 @@ def _is_fixed_there(tables: Mapping[str, Any], place: Place) -> bool:
         rows = weights if isinstance(weights, list) else []
         return any(key in row for row in rows if isinstance(row, Mapping) for key in FACTORS)
     if place[0] in ("counterweights", "balancer_shafts") and place[-1] == "angle":
-        return not any(isinstance(at(tables, (*place[:-1], key)), dict) for key in _SIZES)
+        row = at(tables, place[:2] if place[0] == "counterweights" else place[:4])
+        sizes = [row.get(key) for key in _SIZES]
+        # sizes in a table of an extension, such as a body
+        sizes += [size for key in WEIGHT_KEYS for size in (row.get(key) or {}).values()]
+        return not any(isinstance(size, dict) for size in sizes)
     if place[0] == "mounts":
         return bool(tables["mounts"].get("kind", "rigid") == "rigid")
     return False

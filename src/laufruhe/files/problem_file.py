@@ -25,7 +25,7 @@ from laufruhe.files.nested import Place
 from laufruhe.files.operating_points import FrictionTable, OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.quantities import QuantitiesTable
-from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
+from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable, UnbalanceTable
 from laufruhe.machine import Bearing, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.problem.problem import Problem
@@ -88,6 +88,26 @@ class Key:
     single: bool = False
     adds: Callable[[Any, Cylinders, Throws, tuple[Bearing, ...]], tuple[Cylinders, Throws]] = lambda _, c, t, __: (c, t)
     always: bool = False
+
+
+@dataclass(frozen=True)
+class WeightKey:
+    """Key of the tables of counterweights and of unbalances of shafts that an extension adds.
+
+    Attributes
+    ----------
+    name
+        Name of the key.
+    annotation
+        Type of its value.
+    prepare
+        Function of the file that returns it with the sizes of weights that follow from the key, before these are
+        placed.
+    """
+
+    name: str
+    annotation: Any
+    prepare: Callable[[ProblemFile], ProblemFile]
 
 
 @dataclass(frozen=True)
@@ -162,10 +182,19 @@ class ProblemFile(Table):
 
 EXTENSION_KEYS: Mapping[str, Key] = extended("keys", Key, ())
 """Tables of extensions by their names."""
+WEIGHT_KEYS: Mapping[str, WeightKey] = extended("weight_keys", WeightKey, ())
+"""Keys of weights that extensions add, by their names."""
 
 
 @cache
 def file_model() -> type[ProblemFile]:
-    """Return the model of a problem file with the tables of extensions."""
+    """Return the model of a problem file with the tables and keys of extensions."""
     keys: dict[str, Any] = {key.name: (key.annotation | None, None) for key in EXTENSION_KEYS.values()}
+    of_weights = {key.name: (key.annotation | None, None) for key in WEIGHT_KEYS.values()}
+    weight, unbalance = (f.with_keys(table, of_weights) for table in (CounterweightTable, UnbalanceTable))
+    shaft = f.with_keys(BalancerShaftTable, {"unbalances": (list[unbalance], Field(min_length=1))})  # type: ignore[valid-type]
+    keys |= {
+        "counterweights": (list[weight], Field(default_factory=list)),  # type: ignore[valid-type]
+        "balancer_shafts": (list[shaft], Field(default_factory=list)),  # type: ignore[valid-type]
+    }
     return create_model("ProblemFile", __base__=ProblemFile, __doc__=ProblemFile.__doc__, __module__=__name__, **keys)

@@ -34,7 +34,7 @@ from laufruhe.files.nested import at, number_at, plain, walk, with_value_at
 from laufruhe.files.numbering import sense_of
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, open_phasing
-from laufruhe.files.problem_file import EXTENSION_KEYS, ExtensionContext, Note, ProblemFile, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, WEIGHT_KEYS, ExtensionContext, Note, ProblemFile, file_model
 from laufruhe.files.quantities import with_followers
 from laufruhe.files.ready import ready_named
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
@@ -101,7 +101,8 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             with explained_orders(file.engine):
                 problem = _of_file(file, path)
             if problem.phasing is None:
-                problem = replace(problem, warnings=order_warnings(file.engine, problem.engine.slider_cranks))
+                of_order = order_warnings(file.engine, problem.engine.slider_cranks)
+                problem = replace(problem, warnings=(*problem.warnings, *of_order))
 
             def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
                 problem_of_star = replace(problem_of_star, rebuild=partial(_changed_drawing, closed, path, candidate))
@@ -270,6 +271,8 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     for key in keys:
         if (key_table := getattr(file, key.name)) is not None:
             cylinders, throws = key.adds(key_table, cylinders, throws, bearings)
+    for weight_key in WEIGHT_KEYS.values():
+        file = weight_key.prepare(file)
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)

@@ -58,6 +58,8 @@ class Rotor:
         Mass times eccentricity at phi = 0, as a complex number z + i y [kg m].
     radius
         Eccentricity of its mass [m]; None if the mass itself is not needed.
+    reach
+        Radius that its body sweeps about the shaft [m]; None if it has no body.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Rotor:
     shaft: Shaft = CRANKSHAFT
     role: Role = Role.COUNTERWEIGHT
     radius: float | None = None
+    reach: float | None = None
 
     @property
     def place(self) -> tuple[float, float, float]:

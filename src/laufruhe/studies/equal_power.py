@@ -71,6 +71,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
                 rotor,
                 unbalance=rotor.unbalance * m * k,
                 radius=None if rotor.radius is None else rotor.radius * k,
+                reach=None if rotor.reach is None else rotor.reach * k,
             ).placed(*(k * along for along in rotor.place))
             for rotor in problem.engine.rotors
         ),

@@ -1,0 +1,8 @@
+from typer.models import CommandInfo
+
+
+def drawing():
+    pass
+
+
+DRAWING = CommandInfo(callback=drawing)

@@ -1,0 +1,2 @@
+def applies(r):
+    return False

@@ -1,0 +1,129 @@
+"""Report section of bodies: sizes, masses, clearances and shafts, and the picture of each body."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from laufruhe.extensions.workshop.crankcase import Clearance, is_checked
+from laufruhe.extensions.workshop.part import Weight, Workshop, clearances_of, weights_of
+from laufruhe.machine import Shaft
+from laufruhe.present.numbers import DASH, fixed, number, trimmed
+from laufruhe.present.pictures import ResultPicture
+from laufruhe.present.tables import Table
+from laufruhe.report.section import Section
+from laufruhe.solvers.result import Result
+
+_MM, _GRAMS, _GRAM_MM = 1e3, 1e3, 1e6
+_BODY_NOTE = (
+    "Mass, unbalance and inertia are those of all bodies of a weight; the inertia is about its shaft. "
+    "Open sizes have the least mass with this unbalance."
+)
+_CLEARANCE_NOTE = (
+    "Least distance over a working cycle, and the crank angle at which it occurs. Weights, pistons, rods, walls and "
+    "round parts are checked; webs, bearings and block are not."
+)
+
+
+def applies(result: Result) -> bool:
+    """Return True if a weight of the final design has a body."""
+    return bool(weights_of(result.final.engine))
+
+
+def _tables(result: Result) -> list[Table]:
+    engine = result.final.engine
+    weights = weights_of(engine)
+    shafts = dict.fromkeys(rotor.shaft for rotor in engine.rotors)
+    return [_bodies(weights), _clearances(result), shaft_table(list(shafts))]
+
+
+def sense_of(shaft: Shaft) -> str:
+    """Return the sense of rotation of a shaft in words."""
+    return "with the crank" if shaft.ratio > 0.0 else "against the crank"
+
+
+def shaft_table(shafts: Sequence[Shaft]) -> Table:
+    """Return a table of the place, ratio and sense of shafts."""
+    rows = [
+        (shaft.name, trimmed(_MM * shaft.y), trimmed(_MM * shaft.z), f"{shaft.ratio:+g}", sense_of(shaft))
+        for shaft in shafts
+    ]
+    note = "y to the left, z up from the crank axis (C2); seen from the front the crank turns clockwise (C3)."
+    return Table(("shaft", "y [mm]", "z [mm]", "ratio", "turns"), rows, title="Shafts", note=note, file="shafts")
+
+
+def size_texts(weight: Weight) -> Mapping[str, str]:
+    """Return the sizes of a body with their units, by the words of a table."""
+    shape = weight.body.shape
+    sizes = {key: f"{trimmed(math.degrees(size))} deg" if key in shape.angles else f"{trimmed(_MM * size)} mm"
+             for key, size in shape.sizes.items() if size}  # fmt: skip
+    return {key.replace("_", " "): text for key, text in sizes.items()}
+
+
+def _bodies(weights: Sequence[Weight]) -> Table:
+    head = ("weight", "body", "sizes", "bodies", "thickness [mm]", "mass [g]", "unbalance [g mm]",
+            "centre of mass at [mm]", "inertia [kg mm^2]", "remark")  # fmt: skip
+    rows = []
+    for weight in weights:
+        body = weight.body
+        sizes = ", ".join(f"{key} {text}" for key, text in size_texts(weight).items())
+        rows.append(
+            (weight.rotor.name, body.shape.name, sizes, "2" if body.spacing else "1", trimmed(_MM * body.thickness),
+             number(_GRAMS * body.mass), number(_GRAM_MM * body.unbalance), trimmed(_MM * body.shape.lever),
+             number(1e6 * body.inertia), weight.fault or DASH)
+        )  # fmt: skip
+    return Table(head, rows, title="Bodies of the weights", left=(0, 1, 2, 9), note=_BODY_NOTE, file="bodies")
+
+
+def clearance_text(clearance: Clearance) -> str:
+    """Return a clearance in millimetres, or that the parts collide."""
+    distance = clearance.least.distance
+    return "collides" if distance < 0.0 else fixed(_MM * distance, 2)
+
+
+def _clearances(result: Result) -> Table:
+    engine = result.final.engine
+    workshop, rows = engine.extra(Workshop), []
+    wanted = workshop.crankcase.clearance if workshop else 0.0
+    for weight, kept in clearances_of(engine, weights_of(engine)):
+        for clearance in kept:
+            angle = clearance.least.angle
+            at = "all" if math.isnan(angle) else fixed(math.degrees(angle), 1)
+            rows.append((weight.rotor.name, clearance.part, clearance_text(clearance), at))
+    omitted = [part.name for part in engine.slider_cranks if not is_checked(part)]
+    more = f" Not checked, because they are no plain slider-cranks: {', '.join(omitted)}." if omitted else ""
+    note = f"{_CLEARANCE_NOTE} The file demands {trimmed(_MM * wanted)} mm.{more}"
+    head = ("weight", "part", "clearance [mm]", "at crank angle [deg]")
+    return Table(head, rows, title="Clearances of the bodies", left=2, note=note, file="clearances")
+
+
+def _record(result: Result) -> Mapping[str, Any]:
+    """Return sizes, masses and clearances of the bodies of the final design [SI]."""
+    engine = result.final.engine
+    entries = []
+    for weight, kept in clearances_of(engine, weights_of(engine)):
+        body, shaft = weight.body, weight.rotor.shaft
+        entries.append({
+            "name": weight.rotor.name, "kind": body.shape.name, **body.shape.sizes, "thickness": body.thickness,
+            "density": body.density, "spacing": body.spacing, "mass": body.mass, "unbalance": body.unbalance,
+            "lever": body.shape.lever, "inertia": body.inertia, "x": weight.rotor.x, "fault": weight.fault,
+            "shaft": {"name": shaft.name, "y": shaft.y, "z": shaft.z, "ratio": shaft.ratio, "sense": sense_of(shaft)},
+            "clearances": [
+                {"part": one.part, "distance": _finite(one.least.distance), "lower_bound": _finite(one.least.bound),
+                 "angle": _finite(one.least.angle)}
+                for one in kept
+            ],
+        })  # fmt: skip
+    return {"bodies": entries}
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+SECTION = Section("workshop", applies, _tables, _record, ("bodies", "clearances", "shafts"))
+PICTURE = ResultPicture(
+    "bodies", "Bodies of the weights to scale, with the space that pistons and rods sweep.",
+    "laufruhe.extensions.workshop.picture",
+)  # fmt: skip
