@@ -97,7 +97,7 @@ _OF_SIZES = (
 )  # fmt: skip
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
-    "commands": {"page": "served_page", "drawing": "workshop"},
+    "commands": {"page": "served_page"},
     "keys": {
         "torsion": "torsion",
         "tolerances": "robust",

@@ -149,9 +149,10 @@ def nearest_file(path: Path, otherwise: str) -> str:
 def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: type[BaseModel]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden":
-        homes = HOMES["keys"] if len(loc) == 1 else HOMES["weight_keys"] if loc[0] in _WEIGHTS else {}
-        if str(loc[-1]) in homes:
-            return Complaint(where, "", *missing_extension(homes[str(loc[-1])]))
+        of_table: Mapping[str, str] = HOMES["weight_keys"] if loc[0] in _WEIGHTS else {}
+        extension_homes = HOMES["keys"] if len(loc) == 1 else of_table
+        if str(loc[-1]) in extension_homes:
+            return Complaint(where, "", *missing_extension(extension_homes[str(loc[-1])]))
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
         remedy = _key_remedy(str(loc[-1]), keys, model)
         return Complaint(where, value_text(detail["input"]), "is not a key here", remedy)

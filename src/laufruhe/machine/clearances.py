@@ -24,7 +24,7 @@ class _Swept:
 
 def _shafts(engine: Engine) -> dict[str, _Swept]:
     turning = [(part.shaft, part.crank_radius, False) for part in engine.slider_cranks]
-    turning += [(rotor.shaft, rotor.reach or rotor.radius or 0.0, rotor.role is Role.BALANCER) for rotor in engine.rotors]
+    turning += [(r.shaft, r.reach or r.radius or 0.0, r.role is Role.BALANCER) for r in engine.rotors]
     swept: dict[str, _Swept] = {}
     for shaft, radius, balances in turning:
         known = swept.get(shaft.name, _Swept(shaft))

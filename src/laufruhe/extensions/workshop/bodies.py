@@ -1,4 +1,4 @@
-"""Counterweights as bodies: mass, unbalance and inertia, and sizes that follow from an unbalance (W8 to W10)."""
+"""Counterweights as bodies: mass, unbalance and inertia, and sizes that follow from an unbalance (H8 to H10)."""
 
 from __future__ import annotations
 
@@ -45,17 +45,17 @@ class Body:
 
     @property
     def mass(self) -> float:
-        """Mass [kg] (W8)."""
+        """Mass [kg] (H8)."""
         return self.per_area * self.shape.moments.area
 
     @property
     def unbalance(self) -> float:
-        """Unbalance along the middle of the shape [kg m] (W8)."""
+        """Unbalance along the middle of the shape [kg m] (H8)."""
         return self.per_area * self.shape.moments.first.real
 
     @property
     def inertia(self) -> float:
-        """Moment of inertia about the shaft [kg m2] (W8)."""
+        """Moment of inertia about the shaft [kg m2] (H8)."""
         return self.per_area * self.shape.moments.polar
 
     def extents(self, x: float) -> tuple[tuple[float, float], ...]:
@@ -98,7 +98,7 @@ class BodyRange:
 
 @dataclass(frozen=True)
 class BodyFit:
-    """Bodies of least mass, one for each unbalance from `least_unbalance` to `largest` (W9, W10).
+    """Bodies of least mass, one for each unbalance from `least_unbalance` to `largest` (H9, H10).
 
     With growing unbalance first the outer radius grows, then the thickness, then the angle or width.
 
@@ -138,6 +138,8 @@ class BodyFit:
     def _widest(self, breadth: float | None) -> Shape:
         """Return the shape of this breadth with the largest outer radius that keeps its clearances."""
         low, high = self._radii
+        if breadth is not None and self._is_one_radius:
+            return self._shape(self.narrow.outer_radius, breadth)
         if self._is_free or self.is_clear(self._shape(high, breadth)):
             return self._shape(high, breadth)
         if not self.is_clear(self._shape(low, breadth)):
@@ -159,9 +161,14 @@ class BodyFit:
         return self._widest(None)
 
     @cached_property
+    def _is_one_radius(self) -> bool:
+        """True if the largest breadth allows the radius of the least one, and so every breadth between does."""
+        return self._breadths is not None and self.is_clear(self._shape(self.narrow.outer_radius, self._breadths[1]))
+
+    @cached_property
     def _best_breadth(self) -> float | None:
         """Breadth with the largest first moment; None if the breadth is fixed."""
-        if self._breadths is None or self._is_free:
+        if self._breadths is None or self._is_free or self._is_one_radius:
             return None if self._breadths is None else self._breadths[1]
         low, high = self._breadths
         places = [low + (high - low) * k / (_STEPS - 1) for k in range(_STEPS)]
@@ -185,7 +192,7 @@ class BodyFit:
         return self.sizes.least.unbalance, max(self.largest.unbalance, self.sizes.least.unbalance)
 
     def body_of(self, unbalance: float) -> Body:
-        """Return the body of least mass with this unbalance [kg m] (W10).
+        """Return the body of least mass with this unbalance [kg m] (H10).
 
         Raise ModelError if no body within the range has it.
         """

@@ -1,4 +1,4 @@
-"""Space of a crankcase: pistons, rods, walls and round parts, and their clearances to bodies (W6, W7)."""
+"""Space of a crankcase: pistons, rods, walls and round parts, and their clearances to bodies (H6, H7)."""
 
 from __future__ import annotations
 
@@ -162,12 +162,15 @@ def joints(part: SliderCrank, phi: Array) -> ComplexArray:
     turn = part.throw + part.shaft.ratio * phi
     travel = part.motion(np, turn - part.bank).points[0][1][0]
     centre = complex(part.shaft.z, part.shaft.y)
-    piston = (part.crank_radius + part.rod_length + travel) * cmath.exp(1j * part.bank)
-    return centre + np.array([part.crank_radius * np.exp(1j * turn), piston])
+    # travel counts from alpha = 0, where an offset leans the rod
+    height = part.crank_radius + math.sqrt(part.rod_length**2 - part.offset**2)
+    piston = (height + travel) * cmath.exp(1j * part.bank)
+    return np.array([centre + part.crank_radius * np.exp(1j * turn), centre + piston])
 
 
 def _piston_corners(part: SliderCrank, sides: ComplexArray, phi: Array) -> ComplexArray:
-    return joints(part, phi)[1] + sides[:, None]
+    corners: ComplexArray = joints(part, phi)[1] + sides[:, None]
+    return corners
 
 
 def _rod_corners(part: SliderCrank, ends: tuple[int, ...], phi: Array) -> ComplexArray:
@@ -176,11 +179,11 @@ def _rod_corners(part: SliderCrank, ends: tuple[int, ...], phi: Array) -> Comple
 
 def _other_corners(shape: Shape, seat: Seat, phi: Array) -> ComplexArray:
     turned = np.exp(1j * ((seat.angle or 0.0) + seat.shaft.ratio * phi))
-    return seat.axis + corners_of(shape.outline, FINE)[:, None] * turned
+    return np.asarray(seat.axis + corners_of(shape.outline, FINE)[:, None] * turned)
 
 
 def _to_obstacle(shape: Shape, seat: Seat, obstacle: Obstacle, cycle: float, wanted: float) -> Least:
-    """Return the least distance of a turning shape from an obstacle; of the disc that it sweeps if its angle is open."""
+    """Return the least distance of a turning shape from an obstacle; an open angle takes the disc that it sweeps."""
 
     def distance(phi: Array) -> Array:
         corners = obstacle.corners(phi) - seat.axis
@@ -188,7 +191,7 @@ def _to_obstacle(shape: Shape, seat: Seat, obstacle: Obstacle, cycle: float, wan
             starts, ends = corners, np.roll(corners, -1, axis=0)
             along = ends - starts
             share = np.clip(-(starts * along.conj()).real / np.maximum(np.abs(along) ** 2, 1e-300), 0.0, 1.0)
-            return np.abs(starts + share * along).min(axis=0) - shape.outer_radius - obstacle.radius
+            return np.asarray(np.abs(starts + share * along).min(axis=0) - shape.outer_radius - obstacle.radius)
         turned = corners * np.exp(-1j * (seat.angle + seat.shaft.ratio * phi))
         return distance_to_polygon(shape.outline, turned) - obstacle.radius
 
@@ -235,6 +238,6 @@ def clearances(
 def is_clear(
     crankcase: Crankcase, parts: Sequence[SliderCrank], cycle: float, body: Body, seat: Seat, shape: Shape
 ) -> bool:
-    """Return True if a shape in place of the body's keeps the clearance, which a bound over the cycle proves (W7)."""
+    """Return True if a shape in place of the body's keeps the clearance, which a bound over the cycle proves (H7)."""
     found = clearances(crankcase, parts, cycle, replace(body, shape=shape), seat, wanted=crankcase.clearance)
     return all(clearance.least.bound >= crankcase.clearance for clearance in found)

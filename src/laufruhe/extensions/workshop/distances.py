@@ -1,4 +1,4 @@
-"""Distances between an outline and moving polygons, and the least distance over the turns of a cycle (W6, W7)."""
+"""Distances between an outline and moving polygons, and the least distance over the turns of a cycle (H6, H7)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ TOLERANCE = 1e-6
 """Accuracy of a least distance [m]."""
 FINE = 0.02
 """Angle between points of an arc where only inside and outside matter [rad]."""
-_FIRST, _PARTS, _MAX_ANGLES = 72, 4, 8192
+_FIRST, _PARTS, _MAX_ANGLES = 72, 4, 2048
 
 
 def distance_to_polygon(outline: Outline, corners: ComplexArray) -> Array:
     """Return the distance of an outline from polygons [m], shape (n,); minus infinity where they overlap.
 
-    `corners` has shape (k, n): one corner is a point, two are the ends of a line (W6).
+    `corners` has shape (k, n): one corner is a point, two are the ends of a line (H6).
     """
     starts, ends = (corners, np.roll(corners, -1, axis=0)) if len(corners) > 2 else (corners[:1], corners[-1:])
     nearest = np.min([_to_piece(piece, starts, ends) for piece in outline], axis=0)
@@ -29,7 +29,8 @@ def distance_to_polygon(outline: Outline, corners: ComplexArray) -> Array:
     is_inside = _is_within(body[:, None], corners[0])
     if len(corners) > 2:
         is_inside = is_inside | _is_within(corners, np.full(corners.shape[1], body[0]))
-    return np.where(is_inside | (nearest == 0.0), -np.inf, nearest)
+    distances: Array = np.where(is_inside | (nearest == 0.0), -np.inf, nearest)
+    return distances
 
 
 def _to_piece(piece: Piece, starts: ComplexArray, ends: ComplexArray) -> Array:
@@ -41,7 +42,7 @@ def _to_piece(piece: Piece, starts: ComplexArray, ends: ComplexArray) -> Array:
         crosses = (_side(a, b, starts) * _side(a, b, ends) < 0.0) & (
             _side(starts, ends, a) * _side(starts, ends, b) < 0.0
         )
-        return np.where(crosses, 0.0, np.minimum(from_ends, from_corners)).min(axis=0)
+        return np.asarray(np.where(crosses, 0.0, np.minimum(from_ends, from_corners)).min(axis=0))
     along, length = ends - starts, np.abs(ends - starts)
     unit = along / np.where(length == 0.0, 1.0, length)
     # coordinates of the centre along and across each line
@@ -54,24 +55,26 @@ def _to_piece(piece: Piece, starts: ComplexArray, ends: ComplexArray) -> Array:
         reach = offset.real + side
         is_on_line = (reach >= 0.0) & (reach <= length) & (np.abs(offset.imag) < piece.radius)
         crosses |= is_on_line & _faces(piece, starts + unit * reach)
-    return np.where(crosses, 0.0, np.minimum.reduce(distances)).min(axis=0)
+    return np.asarray(np.where(crosses, 0.0, np.minimum.reduce(distances)).min(axis=0))
 
 
 def _to_line(point: ComplexArray | complex, start: ComplexArray, end: ComplexArray) -> Array:
     along = end - start
     squared = np.maximum(np.abs(along) ** 2, 1e-300)
     share = np.clip(((point - start) * along.conj()).real / squared, 0.0, 1.0)
-    return np.abs(point - start - share * along)
+    distances: Array = np.abs(point - start - share * along)
+    return distances
 
 
 def _side(start: ComplexArray, end: ComplexArray, point: ComplexArray) -> Array:
-    return ((end - start).conj() * (point - start)).imag
+    areas: Array = ((end - start).conj() * (point - start)).imag
+    return areas
 
 
 def _faces(arc: Arc, points: ComplexArray) -> Mask:
     # the direction from the centre lies within the arc
     turned = np.angle((points - arc.centre) * np.exp(-1j * (arc.first_angle + 0.5 * arc.turn)))
-    return np.abs(turned) <= 0.5 * abs(arc.turn)
+    return np.asarray(np.abs(turned) <= 0.5 * abs(arc.turn))
 
 
 def _to_arc(arc: Arc, points: ComplexArray) -> Array:
@@ -99,7 +102,7 @@ class Least:
 
 
 def least_over_cycle(distance: Callable[[Array], Array], rate: float, cycle: float, wanted: float = -math.inf) -> Least:
-    """Return the least value of a distance over crank angles from 0 to `cycle` [rad] (W7).
+    """Return the least value of a distance over crank angles from 0 to `cycle` [rad] (H7).
 
     Parameters
     ----------
@@ -111,9 +114,8 @@ def least_over_cycle(distance: Callable[[Array], Array], rate: float, cycle: flo
         The search ends as soon as the least distance is known to be above or below this one [m].
     """
     count = max(int(_FIRST * cycle / math.tau), 1)
-    count = max(int(_FIRST * cycle / math.tau), 1)
     half, best, cleared = 0.5 * cycle / count, Least(math.inf, math.inf, 0.0), math.inf
-    middles = (2.0 * np.arange(count) + 1.0) * half
+    middles = np.asarray((2.0 * np.arange(count) + 1.0) * half, dtype=float)
     while True:
         values = distance(middles)
         k = int(np.argmin(values))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from laufruhe import units
 from laufruhe.errors import Complaint, ModelError
@@ -183,7 +183,7 @@ def _sized(row: _Row) -> SizedTable:
             raise Refused(where, None, rule, f"{remedy}, or leave the unbalance out")
         return table.model_copy(update={"radius": lever})
     if lever is None:
-        start = _at_start(body, sizes)
+        start = _at_start(body)
         size = Open(sizes.least.unbalance, sizes.most.unbalance, start.unbalance)
         return table.model_copy(update={"unbalance": size})
     thickness = Open.from_value(body.thickness)
@@ -193,7 +193,7 @@ def _sized(row: _Row) -> SizedTable:
     return table.model_copy(update={"mass": size, "radius": lever})
 
 
-def _at_start(body: BodyTable, sizes: BodyRange) -> Body:
+def _at_start(body: BodyTable) -> Body:
     kind, own = SHAPES[body.kind], _SHAPE_KEYS[body.kind]
     values = {key: Open.from_value(getattr(body, key)) for key in own if getattr(body, key) is not None}
     return _body(body, kind, values, "start")
@@ -219,9 +219,11 @@ def _read(table: CrankcaseTable | None, problem: Problem, context: ExtensionCont
 
 
 def _crankcase(table: CrankcaseTable) -> Crankcase:
-    parts = (*table.walls, *table.round_parts)
-    require_distinct([part.name for part in parts], "crankcase", "is the name of two parts")
-    rod = table.rod and RodSize(table.rod.width, table.rod.thickness, table.rod.big_end, table.rod.small_end)
+    names = [*(wall.name for wall in table.walls), *(part.name for part in table.round_parts)]
+    require_distinct(names, "crankcase", "is the name of two parts")
+    rod = None
+    if table.rod is not None:
+        rod = RodSize(table.rod.width, table.rod.thickness, table.rod.big_end, table.rod.small_end)
     walls = tuple(Wall(wall.name, cis(as_turn(wall.angle)), wall.distance) for wall in table.walls)
     round_parts = []
     for k, part in enumerate(table.round_parts, 1):

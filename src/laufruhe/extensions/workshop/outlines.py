@@ -1,4 +1,4 @@
-"""Closed outlines of lines and circular arcs, and their area, first and polar moments in closed form (W1, W2).
+"""Closed outlines of lines and circular arcs, and their area, first and polar moments in closed form (H1, H2).
 
 A point is a complex number in the plane of a body: the real axis runs from the shaft through the middle of the body.
 """
@@ -40,7 +40,7 @@ class Line:
 
     @property
     def moments(self) -> Moments:
-        """Moments of the triangle of the shaft and this line (W1)."""
+        """Moments of the triangle of the shaft and this line (H1)."""
         a, b = self.start, self.end
         area = 0.5 * (a.conjugate() * b).imag
         polar = area / 6.0 * (abs(a) ** 2 + abs(b) ** 2 + (a.conjugate() * b).real)
@@ -72,7 +72,7 @@ class Arc:
 
     @property
     def moments(self) -> Moments:
-        """Moments of the triangle of the shaft and the chord, and of the segment between chord and arc (W2)."""
+        """Moments of the triangle of the shaft and the chord, and of the segment between chord and arc (H2)."""
         r, c, t = self.radius, self.centre, self.turn
         middle = cmath.exp(1j * (self.first_angle + 0.5 * t))
         area, first = 0.5 * r**2 * (t - math.sin(t)), 2.0 / 3.0 * r**3 * math.sin(0.5 * t) ** 3 * middle
@@ -131,7 +131,7 @@ def _heading(piece: Piece, at_end: bool) -> complex:
 def _fillet(before: Piece, after: Piece, radius: float) -> Arc:
     """Return the arc inside a corner that touches both pieces."""
     corner = after.start
-    middles = [middle for middle in _common(_inward(before, radius), _inward(after, radius)) if middle is not None]
+    middles = _common(_inward(before, radius), _inward(after, radius))
     if not middles:
         raise ModelError(f"a fillet of {1e3 * radius:g} mm does not fit into a corner; make it smaller")
     centre = min(middles, key=lambda middle: abs(middle - corner))
@@ -160,8 +160,8 @@ def _common(one: Piece, other: Piece) -> list[complex]:
             return [one.start + reach * along]
         offset = (other.centre - one.start) / along
         half = other.radius**2 - offset.imag**2
-        root = math.sqrt(half) if half >= 0.0 else math.nan
-        return [one.start + along * (offset.real + side * root) for side in (-1.0, 1.0) if half >= 0.0]
+        roots = (-math.sqrt(half), math.sqrt(half)) if half >= 0.0 else ()
+        return [one.start + along * (offset.real + root) for root in roots]
     assert isinstance(other, Arc)
     between = other.centre - one.centre
     distance = abs(between)
@@ -169,8 +169,8 @@ def _common(one: Piece, other: Piece) -> list[complex]:
         return []
     along = (distance**2 + one.radius**2 - other.radius**2) / (2.0 * distance)
     half = one.radius**2 - along**2
-    root = math.sqrt(half) if half >= 0.0 else math.nan
-    return [one.centre + between / distance * complex(along, side * root) for side in (-1.0, 1.0) if half >= 0.0]
+    roots = (-math.sqrt(half), math.sqrt(half)) if half >= 0.0 else ()
+    return [one.centre + between / distance * complex(along, root) for root in roots]
 
 
 def _foot(piece: Piece, point: complex) -> complex:
@@ -183,6 +183,7 @@ def _foot(piece: Piece, point: complex) -> complex:
 
 def _trimmed(piece: Piece, point: complex, at_end: bool) -> Piece:
     """Return the piece up to a point, or from a point on."""
+    trimmed: Piece
     if isinstance(piece, Line):
         trimmed = Line(piece.start, point) if at_end else Line(point, piece.end)
         is_left = ((piece.end - piece.start).conjugate() * (trimmed.end - trimmed.start)).real > 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from typing import ClassVar, Self
 
@@ -24,7 +24,7 @@ class Workshop(Extra):
 
     name: ClassVar[str] = "workshop"
     sizes: tuple[tuple[str, BodyRange], ...] = ()
-    crankcase: Crankcase = Crankcase()
+    crankcase: Crankcase = field(default_factory=Crankcase)
 
     def scaled(self, length: float, mass: float) -> Self:
         """Return the bodies and the crankcase of a similar engine."""

@@ -1,4 +1,4 @@
-"""Report section of bodies: sizes, masses, clearances and shafts, and the picture of each body."""
+"""Report section of bodies: sizes, masses, clearances and shafts."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from laufruhe.extensions.workshop.crankcase import Clearance, is_checked
 from laufruhe.extensions.workshop.part import Weight, Workshop, clearances_of, weights_of
 from laufruhe.machine import Shaft
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
-from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
 
 _MM, _GRAMS, _GRAM_MM = 1e3, 1e3, 1e6
-_BODY_NOTE = (
-    "Mass, unbalance and inertia are those of all bodies of a weight; the inertia is about its shaft. "
-    "Open sizes have the least mass with this unbalance."
-)
+_SIZES = ("inner_radius", "outer_radius", "angle", "width", "tail", "fillet")
+_SIZE_NOTE = "Open sizes are those of the least mass with this unbalance."
+_MASS_NOTE = "Mass, unbalance and inertia are those of all bodies of a weight; the inertia is about its shaft."
 _CLEARANCE_NOTE = (
     "Least distance over a working cycle, and the crank angle at which it occurs. Weights, pistons, rods, walls and "
     "round parts are checked; webs, bearings and block are not."
@@ -35,7 +33,7 @@ def _tables(result: Result) -> list[Table]:
     engine = result.final.engine
     weights = weights_of(engine)
     shafts = dict.fromkeys(rotor.shaft for rotor in engine.rotors)
-    return [_bodies(weights), _clearances(result), shaft_table(list(shafts))]
+    return [*_bodies(weights), _clearances(result), shaft_table(list(shafts))]
 
 
 def sense_of(shaft: Shaft) -> str:
@@ -53,27 +51,31 @@ def shaft_table(shafts: Sequence[Shaft]) -> Table:
     return Table(("shaft", "y [mm]", "z [mm]", "ratio", "turns"), rows, title="Shafts", note=note, file="shafts")
 
 
-def size_texts(weight: Weight) -> Mapping[str, str]:
-    """Return the sizes of a body with their units, by the words of a table."""
-    shape = weight.body.shape
-    sizes = {key: f"{trimmed(math.degrees(size))} deg" if key in shape.angles else f"{trimmed(_MM * size)} mm"
-             for key, size in shape.sizes.items() if size}  # fmt: skip
-    return {key.replace("_", " "): text for key, text in sizes.items()}
-
-
-def _bodies(weights: Sequence[Weight]) -> Table:
-    head = ("weight", "body", "sizes", "bodies", "thickness [mm]", "mass [g]", "unbalance [g mm]",
-            "centre of mass at [mm]", "inertia [kg mm^2]", "remark")  # fmt: skip
-    rows = []
+def _bodies(weights: Sequence[Weight]) -> list[Table]:
+    keys = [key for key in _SIZES if any(weight.body.shape.sizes.get(key) for weight in weights)]
+    sizes, masses = list[Sequence[str]](), list[Sequence[str]]()
     for weight in weights:
-        body = weight.body
-        sizes = ", ".join(f"{key} {text}" for key, text in size_texts(weight).items())
-        rows.append(
-            (weight.rotor.name, body.shape.name, sizes, "2" if body.spacing else "1", trimmed(_MM * body.thickness),
-             number(_GRAMS * body.mass), number(_GRAM_MM * body.unbalance), trimmed(_MM * body.shape.lever),
+        body, name = weight.body, weight.rotor.name
+        of_shape = [_size_text(body.shape.sizes.get(key), key in body.shape.angles) for key in keys]
+        count = "2" if body.spacing else "1"
+        sizes.append((name, body.shape.name, count, *of_shape, trimmed(_MM * body.thickness)))
+        masses.append(
+            (name, number(_GRAMS * body.mass), number(_GRAM_MM * body.unbalance), trimmed(_MM * body.shape.lever),
              number(1e6 * body.inertia), weight.fault or DASH)
         )  # fmt: skip
-    return Table(head, rows, title="Bodies of the weights", left=(0, 1, 2, 9), note=_BODY_NOTE, file="bodies")
+    units = [f"{key.replace('_', ' ')} [{'deg' if key == 'angle' else 'mm'}]" for key in keys]
+    head = ("weight", "kind", "bodies", *units, "thickness [mm]")
+    of_masses = ("weight", "mass [g]", "unbalance [g mm]", "centre of mass at [mm]", "inertia [kg mm^2]", "remark")
+    return [
+        Table(head, sizes, title="Bodies of the weights", left=2, note=_SIZE_NOTE, file="bodies"),
+        Table(of_masses, masses, title="Masses of the bodies", left=(0, 5), note=_MASS_NOTE, file="body-masses"),
+    ]
+
+
+def _size_text(size: float | None, is_angle: bool) -> str:
+    if not size:
+        return DASH
+    return trimmed(math.degrees(size) if is_angle else _MM * size)
 
 
 def clearance_text(clearance: Clearance) -> str:
@@ -122,8 +124,4 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-SECTION = Section("workshop", applies, _tables, _record, ("bodies", "clearances", "shafts"))
-PICTURE = ResultPicture(
-    "bodies", "Bodies of the weights to scale, with the space that pistons and rods sweep.",
-    "laufruhe.extensions.workshop.picture",
-)  # fmt: skip
+SECTION = Section("workshop", applies, _tables, _record, ("bodies", "body-masses", "clearances", "shafts"))

@@ -1,4 +1,4 @@
-"""Plane shapes of counterweights: sector, slab and web cheek (W3 to W5)."""
+"""Plane shapes of counterweights: sector, slab and web cheek (H3 to H5)."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Shape(ABC):
 
 @dataclass(frozen=True)
 class Sector(Shape):
-    """Sector of a disc, or with an inner radius of a ring (W3)."""
+    """Sector of a disc, or with an inner radius of a ring (H3)."""
 
     inner_radius: float = 0.0
     angle: float = math.pi
@@ -89,7 +89,7 @@ class Sector(Shape):
 
 @dataclass(frozen=True)
 class Slab(Shape):
-    """Slab with a flat inner side, turned to the outer radius; without a width a segment of the disc (W4)."""
+    """Slab with a flat inner side, turned to the outer radius; without a width a segment of the disc (H4)."""
 
     inner_radius: float = 0.0
     width: float | None = None
@@ -114,7 +114,7 @@ class Slab(Shape):
 
 @dataclass(frozen=True)
 class Cheek(Shape):
-    """Web cheek: plate with a round end about the crank pin, and opposite to it a sector that may be wider (W5).
+    """Web cheek: plate with a round end about the crank pin, and opposite to it a sector that may be wider (H5).
 
     Attributes
     ----------

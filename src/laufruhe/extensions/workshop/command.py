@@ -1,8 +1,0 @@
-from typer.models import CommandInfo
-
-
-def drawing():
-    pass
-
-
-DRAWING = CommandInfo(callback=drawing)

@@ -1,2 +1,0 @@
-def applies(r):
-    return False
