@@ -48,6 +48,7 @@ def words_of(table: Tables, name: str, folder: Path) -> list[str]:
         "study_kinds": ("study", STUDY.format(name)),
         "commands": (name, text),
         "keys": ("solve", f"{text}\n[{name}]\n"),
+        "weight_keys": ("solve", f'{text}\n[[counterweights]]\nname = "w"\n{name} = {{}}\n'),
         "channels": ("solve", re.sub(r"minimise = .*", f'minimise = "{name}"', text)),
         "notes": ("solve", re.sub(r"reciprocating_mass = .*", f"reciprocating_mass = {mass}", text)),
     }[table]

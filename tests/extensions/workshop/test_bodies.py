@@ -156,8 +156,8 @@ def test_clearances_are_those_of_shapely(seed: int) -> None:
 
 
 def test_open_sizes_have_the_least_mass_of_random_ones() -> None:
-    least = Body(Sector(0.05, 0.0, 0.03, 0.6), 0.008, 7850.0)
-    most = Body(Sector(0.1, 0.0, 0.03, 3.0), 0.02, 7850.0)
+    least = Body(Sector(0.05, 0.003, 0.03, 0.6), 0.008, 7850.0)
+    most = Body(Sector(0.1, 0.003, 0.03, 3.0), 0.02, 7850.0)
 
     def clear(shape: Shape) -> bool:
         # a made-up limit that couples radius and angle
@@ -168,7 +168,7 @@ def test_open_sizes_have_the_least_mass_of_random_ones() -> None:
     rng = np.random.default_rng(1)
     found = 0
     for _ in range(4000):
-        shape = Sector(rng.uniform(0.05, 0.1), 0.0, 0.03, rng.uniform(0.6, 3.0))
+        shape = Sector(rng.uniform(0.05, 0.1), 0.003, 0.03, rng.uniform(0.6, 3.0))
         body = Body(shape, rng.uniform(0.008, 0.02), 7850.0)
         if not clear(shape):
             continue

@@ -133,7 +133,8 @@ def _range_of(body: BodyTable, where: str) -> BodyRange:
     values = {key: Open.from_value(getattr(body, key)) for key in own if getattr(body, key) is not None}
     for key, value in values.items():
         if value.is_open and key != kind.breadth:
-            rule = f"is open, but of a {body.kind} only outer_radius, thickness and {kind.breadth} can be"
+            names = " and ".join(filter(None, ("outer_radius", "thickness", kind.breadth)))
+            rule = f"is open, but of a {body.kind} only {names} can be"
             raise Refused(f"{where}.{key}", None, rule, "give a number")
         if value.is_open and key == "angle" and value.upper > math.radians(_OPEN_UP_TO) * (1.0 + 1e-12):
             text = units.quantity_text(value.upper, "rad")

@@ -30,7 +30,10 @@ class Shape(ABC):
     fillet: float = 0.0
     name: ClassVar[str]
     breadth: ClassVar[str] = ""
-    """Size, apart from outer radius and thickness, that may be open. The shape grows with it in every direction."""
+    """Size, apart from outer radius and thickness, that may be open; empty if there is none.
+
+    The shape grows with it in every direction, and its lever falls.
+    """
     angles: ClassVar[frozenset[str]] = frozenset({"angle"})
 
     @cached_property
@@ -128,7 +131,6 @@ class Cheek(Shape):
     width: float = 0.0
     angle: float | None = None
     name: ClassVar[str] = "cheek"
-    breadth: ClassVar[str] = "angle"
 
     def __post_init__(self) -> None:
         if self.width >= 2.0 * min(self.outer_radius, self.tail):
