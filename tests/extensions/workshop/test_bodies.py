@@ -137,7 +137,7 @@ def compare_with_shapely(seed: int, steps: int = 720) -> tuple[float, float]:
     theirs = by_shapely(part, case, body, seat, steps)
     worst = math.inf
     for clearance in clearances(case, [part], 4.0 * math.pi, body, seat):
-        least, sampled = clearance.least, theirs[clearance.part]
+        least, sampled = clearance.minimum, theirs[clearance.part]
         # sampled angles may miss the least distance by their step, never fall below the bound
         assert least.bound <= max(sampled, 0.0) + 1e-5, (seed, clearance, sampled)
         if least.distance > 0.0:

@@ -78,22 +78,22 @@ class BodyRange:
     Only outer radius, thickness and breadth (angle or width) may differ.
     """
 
-    least: Body
-    most: Body
+    smallest: Body
+    largest: Body
 
     @property
     def is_open(self) -> bool:
         """True if a size is open."""
-        return self.least != self.most
+        return self.smallest != self.largest
 
     @property
     def has_open_shape(self) -> bool:
         """True if a size apart from the thickness is open, so that the centre of mass moves."""
-        return self.least.shape != self.most.shape
+        return self.smallest.shape != self.largest.shape
 
     def scaled(self, length: float, mass: float) -> Self:
         """Return the range with lengths and masses multiplied by these factors."""
-        return replace(self, least=self.least.scaled(length, mass), most=self.most.scaled(length, mass))
+        return replace(self, smallest=self.smallest.scaled(length, mass), largest=self.largest.scaled(length, mass))
 
 
 @dataclass(frozen=True)
@@ -114,26 +114,26 @@ class BodyFit:
     is_clear: Callable[[Shape], bool]
 
     def _shape(self, radius: float, breadth: float | None = None) -> Shape:
-        shape = self.sizes.least.shape.sized(outer_radius=radius)
+        shape = self.sizes.smallest.shape.sized(outer_radius=radius)
         return shape if breadth is None else shape.sized(**{shape.breadth: breadth})
 
     @cached_property
     def _radii(self) -> tuple[float, float]:
-        return self.sizes.least.shape.outer_radius, self.sizes.most.shape.outer_radius
+        return self.sizes.smallest.shape.outer_radius, self.sizes.largest.shape.outer_radius
 
     @cached_property
     def _breadths(self) -> tuple[float, float] | None:
-        low, high = (body.shape.sizes.get(body.shape.breadth) for body in (self.sizes.least, self.sizes.most))
+        low, high = (body.shape.sizes.get(body.shape.breadth) for body in (self.sizes.smallest, self.sizes.largest))
         return None if low is None or high is None or low == high else (low, high)
 
     @cached_property
     def fits(self) -> bool:
         """True if the smallest shape keeps its clearances."""
-        return self.is_clear(self.sizes.least.shape)
+        return self.is_clear(self.sizes.smallest.shape)
 
     @cached_property
     def _is_free(self) -> bool:
-        return self.is_clear(self.sizes.most.shape)
+        return self.is_clear(self.sizes.largest.shape)
 
     def _widest(self, breadth: float | None) -> Shape:
         """Return the shape of this breadth with the largest outer radius that keeps its clearances."""
@@ -162,7 +162,7 @@ class BodyFit:
 
     @cached_property
     def _is_one_radius(self) -> bool:
-        """True if the largest breadth allows the radius of the least one, and so every breadth between does."""
+        # true if the largest breadth allows the radius of the least one, and so every breadth between does
         return self._breadths is not None and self.is_clear(self._shape(self.narrow.outer_radius, self._breadths[1]))
 
     @cached_property
@@ -175,21 +175,21 @@ class BodyFit:
         moments = [self._first_moment(place) for place in places]
         k = max(range(_STEPS), key=moments.__getitem__)
         ends = places[max(k - 1, 0)], places[min(k + 1, _STEPS - 1)]
-        found = minimize_scalar(
+        best = minimize_scalar(
             lambda b: -self._first_moment(b), bounds=ends, method="bounded", options={"xatol": 1e-5 * (high - low)}
         )
-        return float(found.x) if -found.fun > moments[k] else places[k]
+        return float(best.x) if -best.fun > moments[k] else places[k]
 
     @cached_property
     def largest(self) -> Body:
         """Body with the largest unbalance that keeps its clearances."""
         shape = self.narrow if self._best_breadth is None else self._widest(self._best_breadth)
-        return replace(self.sizes.most, shape=shape)
+        return replace(self.sizes.largest, shape=shape)
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Smallest and largest unbalance [kg m]."""
-        return self.sizes.least.unbalance, max(self.largest.unbalance, self.sizes.least.unbalance)
+        return self.sizes.smallest.unbalance, max(self.largest.unbalance, self.sizes.smallest.unbalance)
 
     def body_of(self, unbalance: float) -> Body:
         """Return the body of least mass with this unbalance [kg m] (H10).
@@ -201,27 +201,27 @@ class BodyFit:
         if not low - slack <= unbalance <= high + slack:
             rule = f"an unbalance of {1e6 * unbalance:.5g} g mm"
             raise ModelError(f"{rule} is outside the range of the body, {1e6 * low:.5g} to {1e6 * high:.5g} g mm")
-        least, most = self.sizes.least, self.sizes.most
-        thin, thick = replace(least, shape=self.narrow), replace(most, shape=self.narrow)
+        small, large = self.sizes.smallest, self.sizes.largest
+        thin, thick = replace(small, shape=self.narrow), replace(large, shape=self.narrow)
         if unbalance <= low:
-            return least
+            return small
         if unbalance <= thin.unbalance:
-            ends = least.shape.outer_radius, self.narrow.outer_radius
+            ends = small.shape.outer_radius, self.narrow.outer_radius
 
             def excess(radius: float) -> float:
-                return replace(least, shape=self._shape(radius)).unbalance - unbalance
+                return replace(small, shape=self._shape(radius)).unbalance - unbalance
 
-            return replace(least, shape=self._shape(_root(excess, *ends)))
+            return replace(small, shape=self._shape(_root(excess, *ends)))
         if unbalance <= thick.unbalance or self._best_breadth is None or self._breadths is None:
             share = unbalance / thick.unbalance
-            return replace(thick, thickness=max(min(most.thickness * share, most.thickness), least.thickness))
-        moment = unbalance / most.per_area
+            return replace(thick, thickness=max(min(large.thickness * share, large.thickness), small.thickness))
+        moment = unbalance / large.per_area
         breadth = _root(lambda b: self._first_moment(b) - moment, self._breadths[0], self._best_breadth)
-        return replace(most, shape=self._widest(breadth))
+        return replace(large, shape=self._widest(breadth))
 
 
 def _root(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Return the root of a growing function; an end if rounding leaves no change of sign."""
+    # return the root of a growing function; an end if rounding leaves no change of sign
     if excess(low) >= 0.0:
         return low
     if excess(high) <= 0.0:

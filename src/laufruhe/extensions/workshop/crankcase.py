@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from laufruhe.extensions.workshop.bodies import Body
-from laufruhe.extensions.workshop.distances import Least, distance_to_polygon, least_of, least_over_cycle
+from laufruhe.extensions.workshop.distances import Minimum, distance_to_polygon, minimum_of, minimum_over_cycle
 from laufruhe.extensions.workshop.outlines import corners_of
 from laufruhe.extensions.workshop.shapes import Shape
 from laufruhe.machine import Shaft, SliderCrank
@@ -128,7 +128,7 @@ class Clearance:
     """Least distance of a body from one part over a cycle [m], and the crank angle; NaN if it is the same always."""
 
     part: str
-    least: Least
+    minimum: Minimum
 
 
 def is_checked(part: SliderCrank) -> bool:
@@ -139,18 +139,18 @@ def is_checked(part: SliderCrank) -> bool:
 def obstacles(crankcase: Crankcase, parts: Sequence[SliderCrank], ends: tuple[float, float]) -> Iterator[Obstacle]:
     """Yield pistons and rods that reach between two planes across the shafts [m]."""
     for part in filter(is_checked, parts):
-        apart = max(ends[0] - part.x, part.x - ends[1], 0.0)
+        gap = max(ends[0] - part.x, part.x - ends[1], 0.0)
         lean = part.rod_ratio + abs(part.offset_ratio)
         rate = abs(part.shaft.ratio) * part.crank_radius / math.sqrt(1.0 - lean**2)
         half = 0.5 * (part.bore or 0.0)
-        if crankcase.skirt is not None and apart < half:
-            chord = math.sqrt(half**2 - apart**2)
+        if crankcase.skirt is not None and gap < half:
+            chord = math.sqrt(half**2 - gap**2)
             sides = cmath.exp(1j * part.bank) * np.array(
                 [complex(up, side) for up, side in ((-crankcase.skirt, -chord), (-crankcase.skirt, chord),
                                                     (half, chord), (half, -chord))]
             )  # fmt: skip
             yield Obstacle(f"piston of {part.name}", partial(_piston_corners, part, sides), 0.0, rate)
-        if crankcase.rod is not None and apart < 0.5 * crankcase.rod.thickness:
+        if crankcase.rod is not None and gap < 0.5 * crankcase.rod.thickness:
             rod, name = crankcase.rod, f"rod of {part.name}"
             yield Obstacle(name, partial(_rod_corners, part, (0, 1)), 0.5 * rod.width, rate)
             yield Obstacle(name, partial(_rod_corners, part, (0,)), 0.5 * rod.big_end, rate)
@@ -182,7 +182,7 @@ def _other_corners(shape: Shape, seat: Seat, phi: Array) -> ComplexArray:
     return np.asarray(seat.axis + corners_of(shape.outline, FINE)[:, None] * turned)
 
 
-def _to_obstacle(shape: Shape, seat: Seat, obstacle: Obstacle, cycle: float, wanted: float) -> Least:
+def _to_obstacle(shape: Shape, seat: Seat, obstacle: Obstacle, cycle: float, wanted: float) -> Minimum:
     """Return the least distance of a turning shape from an obstacle; an open angle takes the disc that it sweeps."""
 
     def distance(phi: Array) -> Array:
@@ -196,7 +196,7 @@ def _to_obstacle(shape: Shape, seat: Seat, obstacle: Obstacle, cycle: float, wan
         return distance_to_polygon(shape.outline, turned) - obstacle.radius
 
     rate = obstacle.rate + (0.0 if seat.angle is None else abs(seat.shaft.ratio) * shape.outer_radius)
-    return least_over_cycle(distance, rate, cycle, wanted)
+    return minimum_over_cycle(distance, rate, cycle, wanted)
 
 
 def clearances(
@@ -217,27 +217,27 @@ def clearances(
     radius = body.shape.outer_radius
     for wall in crankcase.walls:
         distance = wall.distance - (wall.direction.conjugate() * seat.axis).real - radius
-        yield Clearance(wall.name, Least(distance, distance, math.nan))
+        yield Clearance(wall.name, Minimum(distance, distance, math.nan))
     for round_part in crankcase.round_parts:
         if any(low < round_part.ends[1] and high > round_part.ends[0] for low, high in body.extents(seat.x)):
             distance = abs(round_part.place - seat.axis) - round_part.radius - radius
-            yield Clearance(round_part.name, Least(distance, distance, math.nan))
-    by_part: dict[str, list[Least]] = {}
+            yield Clearance(round_part.name, Minimum(distance, distance, math.nan))
+    by_part: dict[str, list[Minimum]] = {}
     for ends in body.extents(seat.x):
         for obstacle in obstacles(crankcase, parts, ends):
-            least = _to_obstacle(body.shape, seat, obstacle, cycle, wanted)
-            by_part.setdefault(obstacle.name, []).append(least)
+            minimum = _to_obstacle(body.shape, seat, obstacle, cycle, wanted)
+            by_part.setdefault(obstacle.name, []).append(minimum)
     for name, other, place in others:
         if any(a < d and c < b for a, b in body.extents(seat.x) for c, d in other.extents(place.x)):
             rate = abs(place.shaft.ratio) * other.shape.outer_radius
             obstacle = Obstacle(name, partial(_other_corners, other.shape, place), 0.0, rate)
             by_part[name] = [_to_obstacle(body.shape, seat, obstacle, cycle, wanted)]
-    yield from (Clearance(name, least_of(results)) for name, results in by_part.items())
+    yield from (Clearance(name, minimum_of(results)) for name, results in by_part.items())
 
 
 def is_clear(
     crankcase: Crankcase, parts: Sequence[SliderCrank], cycle: float, body: Body, seat: Seat, shape: Shape
 ) -> bool:
     """Return True if a shape in place of the body's keeps the clearance, which a bound over the cycle proves (H7)."""
-    found = clearances(crankcase, parts, cycle, replace(body, shape=shape), seat, wanted=crankcase.clearance)
-    return all(clearance.least.bound >= crankcase.clearance for clearance in found)
+    all_clearances = clearances(crankcase, parts, cycle, replace(body, shape=shape), seat, wanted=crankcase.clearance)
+    return all(clearance.minimum.bound >= crankcase.clearance for clearance in all_clearances)

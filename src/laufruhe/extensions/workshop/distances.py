@@ -83,7 +83,7 @@ def _to_arc(arc: Arc, points: ComplexArray) -> Array:
 
 
 def _is_within(polygon: ComplexArray, points: ComplexArray) -> Mask:
-    """Return True for points inside polygons by the even-odd rule; corners (k, n) or (k, 1), points (n,)."""
+    # return True for points inside polygons by the even-odd rule; corners (k, n) or (k, 1), points (n,)
     following = np.roll(polygon, -1, axis=0)
     is_between = (polygon.imag > points.imag) != (following.imag > points.imag)
     rise = following.imag - polygon.imag
@@ -93,7 +93,7 @@ def _is_within(polygon: ComplexArray, points: ComplexArray) -> Mask:
 
 
 @dataclass(frozen=True)
-class Least:
+class Minimum:
     """Least distance over a cycle [m], a lower bound of it, and the crank angle where it occurs [rad]."""
 
     distance: float
@@ -101,7 +101,9 @@ class Least:
     angle: float
 
 
-def least_over_cycle(distance: Callable[[Array], Array], rate: float, cycle: float, wanted: float = -math.inf) -> Least:
+def minimum_over_cycle(
+    distance: Callable[[Array], Array], rate: float, cycle: float, wanted: float = -math.inf
+) -> Minimum:
     """Return the least value of a distance over crank angles from 0 to `cycle` [rad] (H7).
 
     Parameters
@@ -114,25 +116,25 @@ def least_over_cycle(distance: Callable[[Array], Array], rate: float, cycle: flo
         The search ends as soon as the least distance is known to be above or below this one [m].
     """
     count = max(int(_FIRST * cycle / math.tau), 1)
-    half, best, cleared = 0.5 * cycle / count, Least(math.inf, math.inf, 0.0), math.inf
+    half, best, cleared = 0.5 * cycle / count, Minimum(math.inf, math.inf, 0.0), math.inf
     middles = np.asarray((2.0 * np.arange(count) + 1.0) * half, dtype=float)
     while True:
         values = distance(middles)
         k = int(np.argmin(values))
         if values[k] < best.distance:
-            best = Least(float(values[k]), -math.inf, float(middles[k]))
+            best = Minimum(float(values[k]), -math.inf, float(middles[k]))
         bounds = values - rate * half
         is_left = bounds < best.distance - TOLERANCE
         if math.isfinite(wanted):
             is_left &= bounds < wanted
         cleared = min([cleared, *bounds[~is_left]])
         if best.distance < wanted or not 0 < is_left.sum() * _PARTS <= _MAX_ANGLES:
-            return Least(best.distance, min([cleared, best.distance, *bounds[is_left]]), best.angle)
+            return Minimum(best.distance, min([cleared, best.distance, *bounds[is_left]]), best.angle)
         half /= _PARTS
         steps = half * (2.0 * np.arange(_PARTS) + 1.0 - _PARTS)
         middles = (middles[is_left, None] + steps).ravel()
 
 
-def least_of(results: Sequence[Least]) -> Least:
+def minimum_of(results: Sequence[Minimum]) -> Minimum:
     """Return the least of some results; infinite without any."""
-    return min(results, key=lambda least: least.distance, default=Least(math.inf, math.inf, 0.0))
+    return min(results, key=lambda minimum: minimum.distance, default=Minimum(math.inf, math.inf, 0.0))

@@ -122,15 +122,15 @@ def _rows(file: ProblemFile, rotors: Sequence[str] = ()) -> Iterator[_Row]:
 
 def _range_of(body: BodyTable, where: str) -> BodyRange:
     """Return the range of bodies of a table; raise `Refused` for sizes that are missing or out of place."""
-    own, kind = _SHAPE_KEYS[body.kind], SHAPES[body.kind]
+    keys, kind = _SHAPE_KEYS[body.kind], SHAPES[body.kind]
     foreign = [
-        key for key in ("inner_radius", "angle", "width", "tail") if key not in own and key in body.model_fields_set
+        key for key in ("inner_radius", "angle", "width", "tail") if key not in keys and key in body.model_fields_set
     ]
-    refuse_keys(body, foreign, where, f"does not belong to a {body.kind}", f"a {body.kind} has {', '.join(own)}")
+    refuse_keys(body, foreign, where, f"does not belong to a {body.kind}", f"a {body.kind} has {', '.join(keys)}")
     for key in _REQUIRED[body.kind]:
         if getattr(body, key) is None:
             raise Refused(f"{where}.{key}", None, f"is missing, but a {body.kind} needs it", "add it")
-    values = {key: Open.from_value(getattr(body, key)) for key in own if getattr(body, key) is not None}
+    values = {key: Open.from_value(getattr(body, key)) for key in keys if getattr(body, key) is not None}
     for key, value in values.items():
         if value.is_open and key != kind.breadth:
             names = " and ".join(filter(None, ("outer_radius", "thickness", kind.breadth)))
@@ -176,7 +176,7 @@ def _sized(row: _Row) -> SizedTable:
     where = f"{row.where}.body"
     sizes = _range_of(body, where)
     refuse_keys(table, ("mass", "radius"), row.where, "cannot stand beside a body, which gives it", "leave it out")
-    lever = None if sizes.has_open_shape else sizes.most.shape.lever
+    lever = None if sizes.has_open_shape else sizes.largest.shape.lever
     follows = getattr(table, "factor_key", None) or getattr(table, "coupled", None) or table.unbalance is not None
     if follows:
         if not sizes.is_open:
@@ -185,18 +185,18 @@ def _sized(row: _Row) -> SizedTable:
         return table.model_copy(update={"radius": lever})
     if lever is None:
         start = _at_start(body)
-        size = Open(sizes.least.unbalance, sizes.most.unbalance, start.unbalance)
+        size = Open(sizes.smallest.unbalance, sizes.largest.unbalance, start.unbalance)
         return table.model_copy(update={"unbalance": size})
     thickness = Open.from_value(body.thickness)
     if not thickness.upper > 0.0:
         raise Refused(f"{where}.thickness", units.quantity_text(0.0, "m"), "must be more than 0 m", "make it larger")
-    size = Open(sizes.least.mass, sizes.most.mass, replace(sizes.least, thickness=thickness.start).mass)
+    size = Open(sizes.smallest.mass, sizes.largest.mass, replace(sizes.smallest, thickness=thickness.start).mass)
     return table.model_copy(update={"mass": size, "radius": lever})
 
 
 def _at_start(body: BodyTable) -> Body:
-    kind, own = SHAPES[body.kind], _SHAPE_KEYS[body.kind]
-    values = {key: Open.from_value(getattr(body, key)) for key in own if getattr(body, key) is not None}
+    kind, keys = SHAPES[body.kind], _SHAPE_KEYS[body.kind]
+    values = {key: Open.from_value(getattr(body, key)) for key in keys if getattr(body, key) is not None}
     return _body(body, kind, values, "start")
 
 
@@ -250,11 +250,11 @@ def _within_body(problem: Problem, crankcase: Crankcase, rotor: Rotor, sizes: Bo
         raise Refused(where, None, rule, "fix the place, or leave only the thickness open")
     seat = _seat(rotor, problem.decisions)
     fit = fit_of(sizes, crankcase, engine.slider_cranks, engine.cycle.angle, seat)
-    reach = sizes.most.shape.outer_radius
+    reach = sizes.largest.shape.outer_radius
     if not places and not fit.fits:
         worst = min(
-            clearances(crankcase, engine.slider_cranks, engine.cycle.angle, sizes.least, seat),
-            key=lambda one: one.least.distance, default=None,
+            clearances(crankcase, engine.slider_cranks, engine.cycle.angle, sizes.smallest, seat),
+            key=lambda one: one.minimum.distance, default=None,
         )  # fmt: skip
         hit = worst.part if worst else "other parts"
         rule, remedy = f"does not keep its clearance from {hit}", "make it smaller, or move it"
@@ -263,7 +263,7 @@ def _within_body(problem: Problem, crankcase: Crankcase, rotor: Rotor, sizes: Bo
         problem = replace(problem, warnings=(*problem.warnings, Complaint(where, "", rule, remedy)))
     elif sizes.has_open_shape:
         reach = fit.narrow.outer_radius
-    low, high = fit.bounds if sizes.has_open_shape else (sizes.least.unbalance, sizes.most.unbalance)
+    low, high = fit.bounds if sizes.has_open_shape else (sizes.smallest.unbalance, sizes.largest.unbalance)
     decisions = tuple(_cut(decision, rotor, low, high, where) for decision in problem.decisions)
     if sizes.is_open and not any(_drives(decision, rotor) for decision in decisions) and rotor.unbalance:
         with errors_at_key(where):
@@ -277,13 +277,13 @@ def _drives(decision: Decision, rotor: Rotor) -> list[RotorDrive]:
 
 
 def _seat(rotor: Rotor, decisions: Sequence[Decision]) -> Seat:
-    """Return the seat of a body; its angle is that of the largest unbalance, or None if the angle is open."""
+    # return the seat of a body; its angle is that of the largest unbalance, or None if the angle is open
     for decision in decisions:
         for drive in _drives(decision, rotor):
             if isinstance(decision.set, Sector):
                 return Seat(rotor.x, rotor.shaft, None)
-            most = decision.upper * decision.set.directions[0]
-            return seat_of(rotor, rotor.unbalance + drive.of(most - decision.start))
+            upper = decision.upper * decision.set.directions[0]
+            return seat_of(rotor, rotor.unbalance + drive.of(upper - decision.start))
     return seat_of(rotor, rotor.unbalance)
 
 

@@ -129,7 +129,7 @@ def _heading(piece: Piece, at_end: bool) -> complex:
 
 
 def _fillet(before: Piece, after: Piece, radius: float) -> Arc:
-    """Return the arc inside a corner that touches both pieces."""
+    # return the arc inside a corner that touches both pieces
     corner = after.start
     middles = _common(_inward(before, radius), _inward(after, radius))
     if not middles:

@@ -58,7 +58,7 @@ def seat_of(rotor: Rotor, unbalance: complex) -> Seat:
 @lru_cache(maxsize=512)
 def fit_of(sizes: BodyRange, crankcase: Crankcase, parts: tuple[SliderCrank, ...], cycle: float, seat: Seat) -> BodyFit:
     """Return the bodies of least mass that keep the clearances on a seat."""
-    return BodyFit(sizes, partial(is_clear, crankcase, parts, cycle, sizes.most, seat))
+    return BodyFit(sizes, partial(is_clear, crankcase, parts, cycle, sizes.largest, seat))
 
 
 def weights_of(engine: Engine) -> list[Weight]:
@@ -75,13 +75,13 @@ def weights_of(engine: Engine) -> list[Weight]:
 def _weight(engine: Engine, rotor: Rotor, sizes: BodyRange, crankcase: Crankcase) -> Weight:
     seat = seat_of(rotor, rotor.unbalance)
     if not sizes.is_open:
-        return Weight(rotor, seat, sizes.least)
+        return Weight(rotor, seat, sizes.smallest)
     fit = fit_of(sizes, crankcase, engine.slider_cranks, engine.cycle.angle, seat)
     try:
         return Weight(rotor, seat, fit.body_of(abs(rotor.unbalance)))
     except ModelError as error:
         low, high = fit.bounds if fit.fits or not sizes.has_open_shape else (0.0, 0.0)
-        nearest = sizes.least if abs(rotor.unbalance) <= low or not high else fit.largest
+        nearest = sizes.smallest if abs(rotor.unbalance) <= low or not high else fit.largest
         return Weight(rotor, seat, nearest, str(error))
 
 
@@ -95,10 +95,10 @@ def clearances_of(engine: Engine, weights: Sequence[Weight]) -> Iterator[tuple[W
             for other in weights[:k]
             if other.rotor.shaft.name != weight.rotor.shaft.name
         ]
-        kept = clearances(crankcase, engine.slider_cranks, engine.cycle.angle, weight.body, weight.seat, others)
-        yield weight, sorted(kept, key=lambda clearance: clearance.least.distance)
+        distances = clearances(crankcase, engine.slider_cranks, engine.cycle.angle, weight.body, weight.seat, others)
+        yield weight, sorted(distances, key=lambda clearance: clearance.minimum.distance)
 
 
-def least_clearance(kept: Sequence[Clearance]) -> float:
+def smallest_clearance(distances: Sequence[Clearance]) -> float:
     """Return the least of some clearances [m]; infinite without any."""
-    return min((clearance.least.distance for clearance in kept), default=math.inf)
+    return min((clearance.minimum.distance for clearance in distances), default=math.inf)

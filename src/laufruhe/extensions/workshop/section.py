@@ -80,7 +80,7 @@ def _size_text(size: float | None, is_angle: bool) -> str:
 
 def clearance_text(clearance: Clearance) -> str:
     """Return a clearance in millimetres, or that the parts collide."""
-    distance = clearance.least.distance
+    distance = clearance.minimum.distance
     return "collides" if distance < 0.0 else fixed(_MM * distance, 2)
 
 
@@ -88,9 +88,9 @@ def _clearances(result: Result) -> Table:
     engine = result.final.engine
     workshop, rows = engine.extra(Workshop), []
     wanted = workshop.crankcase.clearance if workshop else 0.0
-    for weight, kept in clearances_of(engine, weights_of(engine)):
-        for clearance in kept:
-            angle = clearance.least.angle
+    for weight, distances in clearances_of(engine, weights_of(engine)):
+        for clearance in distances:
+            angle = clearance.minimum.angle
             at = "all" if math.isnan(angle) else fixed(math.degrees(angle), 1)
             rows.append((weight.rotor.name, clearance.part, clearance_text(clearance), at))
     omitted = [part.name for part in engine.slider_cranks if not is_checked(part)]
@@ -104,7 +104,7 @@ def _record(result: Result) -> Mapping[str, Any]:
     """Return sizes, masses and clearances of the bodies of the final design [SI]."""
     engine = result.final.engine
     entries = []
-    for weight, kept in clearances_of(engine, weights_of(engine)):
+    for weight, distances in clearances_of(engine, weights_of(engine)):
         body, shaft = weight.body, weight.rotor.shaft
         entries.append({
             "name": weight.rotor.name, "kind": body.shape.name, **body.shape.sizes, "thickness": body.thickness,
@@ -112,9 +112,9 @@ def _record(result: Result) -> Mapping[str, Any]:
             "lever": body.shape.lever, "inertia": body.inertia, "x": weight.rotor.x, "fault": weight.fault,
             "shaft": {"name": shaft.name, "y": shaft.y, "z": shaft.z, "ratio": shaft.ratio, "sense": sense_of(shaft)},
             "clearances": [
-                {"part": one.part, "distance": _finite(one.least.distance), "lower_bound": _finite(one.least.bound),
-                 "angle": _finite(one.least.angle)}
-                for one in kept
+                {"part": one.part, "distance": _finite(one.minimum.distance), "lower_bound": _finite(one.minimum.bound),
+                 "angle": _finite(one.minimum.angle)}
+                for one in distances
             ],
         })  # fmt: skip
     return {"bodies": entries}
