@@ -241,10 +241,8 @@ def _within_body(problem: Problem, crankcase: Crankcase, rotor: Rotor, sizes: Bo
 
     Raise `Refused` if no body fits.
     """
-    engine, places = (
-        problem.engine,
-        [d for d in problem.decisions if any(p.rotor == rotor.name for p in d.place_drives)],
-    )
+    engine = problem.engine
+    places = [one for one in problem.decisions if any(drive.rotor == rotor.name for drive in one.place_drives)]
     if places and sizes.has_open_shape:
         rule = f"has an open radius, angle or width while {places[0].name} is open"
         raise Refused(where, None, rule, "fix the place, or leave only the thickness open")
