@@ -459,6 +459,7 @@ class EngineParts(Parts):
         balance_fraction: Value | None = None, throws: Sequence[int] | None = None, x: Value | None = None,
         opposite_throw: int | None = None, unbalance: Value | complex | None = None,
         mass: Value | complex | None = None, radius: Value | None = None, angle: Value | None = None,
+        body: Table | None = None,
     ) -> Self:
         """Return the engine with a counterweight.
 
@@ -489,6 +490,8 @@ class EngineParts(Parts):
         angle
             Angle at which it stands when cylinder 1 is at its firing dead centre, from upright in the sense of rotation
             [rad].
+        body
+            Body of a weight, from which its mass and unbalance follow.
         """
         return self._with("counterweights", "counterweight", keys_of(locals()))
 
@@ -714,3 +717,26 @@ class EngineParts(Parts):
             A viscous or rubber damper, or a pendulum.
         """
         return self._with("torsion", "torsion", keys_of(locals()))
+
+    def crankcase(
+        self, *, clearance: Value | None = None, skirt: Value | None = None, rod: Table | None = None,
+        walls: Sequence[Table] | None = None, round_parts: Sequence[Table] | None = None,
+    ) -> Self:
+        """Return the engine with crankcase.
+
+        Space in which weights turn.
+
+        Parameters
+        ----------
+        clearance
+            Smallest distance that weights keep from all parts [m].
+        skirt
+            Distance from the piston pin to the lower edge of the piston; without it pistons are not checked [m].
+        rod
+            Sizes of the rods; without them rods are not checked.
+        walls
+            Flat walls along the shafts.
+        round_parts
+            Round parts along the shafts.
+        """
+        return self._with("crankcase", "crankcase", keys_of(locals()))

@@ -82,6 +82,41 @@ def big_end(
     return keys_of(locals())
 
 
+def body(
+    *, kind: Literal["sector", "slab", "cheek"], outer_radius: Value, thickness: Value,
+    inner_radius: Value | None = None, angle: Value | None = None, width: Value | None = None,
+    tail: Value | None = None, fillet: Value | None = None, density: Value | None = None, spacing: Value | None = None,
+) -> Table:
+    """Return a table `body`.
+
+    Body of a weight, from which its mass and unbalance follow.
+
+    Parameters
+    ----------
+    kind
+        A sector of a disc or ring; a slab with a flat inner side; a web cheek with a round end about the crank pin.
+    outer_radius
+        Radius that the body sweeps about its shaft [m].
+    thickness
+        Length along the shaft, of each of two bodies [m].
+    inner_radius
+        Inner radius of a sector, or distance of the flat side of a slab from the shaft [m].
+    angle
+        Opening angle of a sector, or of the wide end of a cheek [rad].
+    width
+        Width of a slab or cheek across its middle line [m].
+    tail
+        Distance of the round end of a cheek from the shaft [m].
+    fillet
+        Radius at every corner that points outwards [m].
+    density
+        Density; that of steel by default [kg/m^3].
+    spacing
+        Distance between the middles of two equal bodies, one on either web of a throw; 0 for one body [m].
+    """
+    return keys_of(locals())
+
+
 def bolts(
     *, diameter: Value, count: int | None = None,
 ) -> Table:
@@ -488,6 +523,27 @@ def rim(
     return keys_of(locals())
 
 
+def rod_size(
+    *, width: Value, thickness: Value, big_end: Value, small_end: Value | None = None,
+) -> Table:
+    """Return a table `rod_size`.
+
+    Rod as a part that weights must not hit.
+
+    Parameters
+    ----------
+    width
+        Width of the shank across the shaft [m].
+    thickness
+        Width along the shaft [m].
+    big_end
+        Outer diameter of the big end [m].
+    small_end
+        Outer diameter of the small end [m].
+    """
+    return keys_of(locals())
+
+
 def rod(
     *, mass: Value, centre_of_gravity: Value, inertia: Value,
 ) -> Table:
@@ -503,6 +559,27 @@ def rod(
         Distance of the centre of gravity from the crank pin, on the line of the pins [m].
     inertia
         Moment of inertia about the centre of gravity [kg m^2].
+    """
+    return keys_of(locals())
+
+
+def round_part(
+    name: str, *, position: Values, radius: Value, x: Values | None = None,
+) -> Table:
+    """Return a table `round_part`.
+
+    Round part along the shafts, such as a camshaft.
+
+    Parameters
+    ----------
+    name
+        Name in tables, pictures and messages.
+    position
+        Position of its axis: y to the left, z up [m].
+    radius
+        Radius that it takes, such as that of a cam [m].
+    x
+        Rear and front end; without them it is as long as the engine [m].
     """
     return keys_of(locals())
 
@@ -782,7 +859,7 @@ def torsion_shaft(
 def unbalance(
     name: str | None = None, *, x: Value | None = None, unbalance: Value | complex | None = None,
     mass: Value | complex | None = None, radius: Value | None = None, angle: Value | None = None,
-    coupled: Table | None = None,
+    coupled: Table | None = None, body: Table | None = None,
 ) -> Table:
     """Return a table `unbalance`.
 
@@ -805,6 +882,27 @@ def unbalance(
         [rad].
     coupled
         Unbalance that follows another one.
+    body
+        Body of a weight, from which its mass and unbalance follow.
+    """
+    return keys_of(locals())
+
+
+def wall(
+    name: str, *, angle: Value, distance: Value,
+) -> Table:
+    """Return a table `wall`.
+
+    Flat wall along the shafts, such as a sump.
+
+    Parameters
+    ----------
+    name
+        Name in tables, pictures and messages.
+    angle
+        Direction from the crank axis to the wall: 0 is up, 90 left, 180 down [rad].
+    distance
+        Distance of the wall from the crank axis [m].
     """
     return keys_of(locals())
 
