@@ -22,7 +22,7 @@ from picture_faults import faults_of
 from problem_files import PROBLEMS
 
 
-@pytest.mark.parametrize("name", ["vee-six-60", "radial-seven", "boxer-four"])
+@pytest.mark.parametrize("name", ["vee-six-60", "radial-seven", "boxer-four", "vr-six"])
 def test_pistons_go_through_their_stroke_on_their_axes(name: str) -> None:
     for part in load(PROBLEMS / f"{name}.toml").engine.slider_cranks:
         poses = [Pose.at_angle(part, phi) for phi in np.linspace(0.0, math.tau, 361)]

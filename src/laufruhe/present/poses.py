@@ -35,7 +35,8 @@ class Pose:
         turn = part.throw + part.shaft.ratio * phi
         rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius
         offset = complex(part.motion(np, np.float64(turn - part.bank)).points[0][1][0])
-        distance = part.crank_radius + rod + offset
+        # positions count from alpha = 0, where the rod leans by the offset
+        distance = part.crank_radius + math.sqrt(rod**2 - part.offset**2) + offset
         bodies = tuple(
             replace(body, points=centre + axis * body.points) for body in part.outlines(float(turn - part.bank))
         )
