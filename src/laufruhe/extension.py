@@ -95,6 +95,7 @@ _OF_SIZES = (
     "main-bearing pressure times speed", "share of the buckling load", "piston-pin pressure", "piston-pin deflection",
     "piston-pin bending stress", "piston-pin ovality", "throw clearance", "running-gear mass",
 )  # fmt: skip
+_OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
     "commands": {"page": "served_page"},
@@ -106,12 +107,14 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "run_up": "run_ups",
         "running_gear": "sizes",
         "crankcase": "workshop",
+        "receivers": "receivers",
+        "frame": "receivers",
     },
     "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "layouts": {"rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke"},
-    "channels": dict.fromkeys(_OF_SIZES, "sizes"),
+    "channels": dict.fromkeys(_OF_SIZES, "sizes") | dict.fromkeys(_OF_RECEIVERS, "receivers"),
 }
 """Extensions of this package by the names that they add to tables, for the complaint if one is not installed."""
 INSTALL = "install laufruhe with all its folders"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.errors import UncarriedLoadError, plural
+from laufruhe.errors import ModelError, plural
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, relative, signals
 from laufruhe.fidelity.options import has_gas
 from laufruhe.machine import Engine
@@ -140,7 +140,7 @@ def _cheapest(reference: ErrorReference, allowed_error: float, fidelity: Fidelit
         rigid = replace(fidelity, mounts="rigid")
         try:
             is_sufficient = loss(rigid) <= loss(fidelity) + PART_SHARE * allowed_error
-        except UncarriedLoadError:
+        except ModelError:
             is_sufficient = False
         fidelity = rigid if is_sufficient else _with_few_modes(reference, fidelity, PART_SHARE * allowed_error)
     if is_even:

@@ -40,6 +40,7 @@ PLACES = {
     "cylinders": "cylinder",
     "sections": "shaft section",
     "webs": "web",
+    "receivers": "receiver",
 }
 SIDES = {"max": "at most", "min": "at least"}
 EDGES = (*SIDES, "outside")
@@ -67,6 +68,7 @@ class QuantityTable(Table):
     webs: list[str] | None = f.optional(
         "Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ..."
     )
+    receivers: list[str] | None = f.optional("Receivers that count, by name; all by default.")
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     alternating: bool | None = f.optional(

@@ -37,11 +37,16 @@ QuantityName: TypeAlias = Literal[
     "rms side force", "peak to peak side force", "worst mean side force", "rmq side force", "mean friction power",
     "mean crank torque", "maximum crank torque", "rms crank torque", "peak to peak crank torque",
     "worst mean crank torque", "rmq crank torque", "mean stored work", "maximum stored work", "rms stored work",
-    "peak to peak stored work", "worst mean stored work", "rmq stored work", "mean crank-pin bending stress",
-    "maximum crank-pin bending stress", "rms crank-pin bending stress", "peak to peak crank-pin bending stress",
-    "worst mean crank-pin bending stress", "rmq crank-pin bending stress", "mean web stress", "maximum web stress",
-    "rms web stress", "peak to peak web stress", "worst mean web stress", "rmq web stress",
-    "mean journal torsion stress", "maximum journal torsion stress", "rms journal torsion stress",
+    "peak to peak stored work", "worst mean stored work", "rmq stored work", "mean receiver acceleration",
+    "maximum receiver acceleration", "rms receiver acceleration", "peak to peak receiver acceleration",
+    "worst mean receiver acceleration", "rmq receiver acceleration", "mean receiver velocity",
+    "maximum receiver velocity", "rms receiver velocity", "peak to peak receiver velocity",
+    "worst mean receiver velocity", "rmq receiver velocity", "mean receiver pressure", "maximum receiver pressure",
+    "rms receiver pressure", "peak to peak receiver pressure", "worst mean receiver pressure", "rmq receiver pressure",
+    "mean crank-pin bending stress", "maximum crank-pin bending stress", "rms crank-pin bending stress",
+    "peak to peak crank-pin bending stress", "worst mean crank-pin bending stress", "rmq crank-pin bending stress",
+    "mean web stress", "maximum web stress", "rms web stress", "peak to peak web stress", "worst mean web stress",
+    "rmq web stress", "mean journal torsion stress", "maximum journal torsion stress", "rms journal torsion stress",
     "peak to peak journal torsion stress", "worst mean journal torsion stress", "rmq journal torsion stress",
     "mean journal stress", "maximum journal stress", "rms journal stress", "peak to peak journal stress",
     "worst mean journal stress", "rmq journal stress", "mean main-bearing pressure times speed",
@@ -84,8 +89,9 @@ class Goals(ABC):
         self, minimise: QuantityName | None = None, *, mounts: Sequence[str] | None = None,
         bearings: Sequence[str] | None = None, cylinders: Sequence[str] | None = None,
         sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
-        operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
-        direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+        receivers: Sequence[str] | None = None, operating_points: Sequence[str] | None = None,
+        orders: Values | None = None, alternating: bool | None = None, direction_weights: Values | None = None,
+        load_cases: Sequence[str] | None = None,
         motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
         wanted: Number | None = None, frequency: Value | None = None, terms: Sequence[Table] | None = None,
     ) -> Self:
@@ -105,6 +111,8 @@ class Goals(ABC):
             Sections of the crankshaft that count, named after the discs that they join; all by default.
         webs
             Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
+        receivers
+            Receivers that count, by name; all by default.
         operating_points
             Names of the operating points that count; all by default.
         orders
@@ -131,8 +139,9 @@ class Goals(ABC):
         self, minimise: QuantityName | None = None, *, mounts: Sequence[str] | None = None,
         bearings: Sequence[str] | None = None, cylinders: Sequence[str] | None = None,
         sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
-        operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
-        direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+        receivers: Sequence[str] | None = None, operating_points: Sequence[str] | None = None,
+        orders: Values | None = None, alternating: bool | None = None, direction_weights: Values | None = None,
+        load_cases: Sequence[str] | None = None,
         motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
         wanted: Number | None = None, frequency: Value | None = None, terms: Sequence[Table] | None = None,
         within: Number | None = None,
@@ -153,6 +162,8 @@ class Goals(ABC):
             Sections of the crankshaft that count, named after the discs that they join; all by default.
         webs
             Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
+        receivers
+            Receivers that count, by name; all by default.
         operating_points
             Names of the operating points that count; all by default.
         orders
@@ -180,9 +191,9 @@ class Goals(ABC):
     def limit(
         self, limit: QuantityName, *, mounts: Sequence[str] | None = None, bearings: Sequence[str] | None = None,
         cylinders: Sequence[str] | None = None, sections: Sequence[str] | None = None,
-        webs: Sequence[str] | None = None, operating_points: Sequence[str] | None = None, orders: Values | None = None,
-        alternating: bool | None = None, direction_weights: Values | None = None,
-        load_cases: Sequence[str] | None = None,
+        webs: Sequence[str] | None = None, receivers: Sequence[str] | None = None,
+        operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
+        direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
         motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
         wanted: Number | None = None, frequency: Value | None = None, max: Number | None = None,
         min: Number | None = None, outside: Values | None = None, name: str | None = None,
@@ -204,6 +215,8 @@ class Goals(ABC):
             Sections of the crankshaft that count, named after the discs that they join; all by default.
         webs
             Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
+        receivers
+            Receivers that count, by name; all by default.
         operating_points
             Names of the operating points that count; all by default.
         orders

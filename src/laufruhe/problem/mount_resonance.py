@@ -42,7 +42,7 @@ def evaluate_start(problem: Problem) -> Evaluation:
         forces, travel = (
             Spectrum(s.base, np.where(resonant[:, None, None], np.inf, s.coefficients)) for s in signals
         )  # fmt: skip
-        loads.append(PointLoads(point, wrench, forces, travel))
+        loads.append(PointLoads(point, wrench, forces, travel, engine, problem.fidelity))
     return Evaluation(engine, problem.fidelity, tuple(loads), problem.fidelity.samples, description)
 
 

@@ -579,6 +579,61 @@ class EngineParts(Parts):
         """
         return self._with("search", "search", keys_of(locals()))
 
+    def frame(
+        self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None,
+        inertia_products: Values | None = None, springs: Sequence[Table] | None = None,
+    ) -> Self:
+        """Return the engine with frame.
+
+        Rigid frame under the mounts of the engine, for receivers alone; other quantities have rigid ground there.
+
+        Parameters
+        ----------
+        mass
+            Mass of the frame and all that is bolted to it, without the engine [kg].
+        inertia
+            Moments of inertia about x, y and z through its centre of gravity [kg m^2].
+        centre_of_gravity
+            Its centre of gravity [m].
+        inertia_products
+            Products of inertia xy, xz, yz [kg m^2].
+        springs
+            Springs between frame and ground; none for a free frame.
+        """
+        return self._with("frame", "frame", keys_of(locals()))
+
+    def receiver(
+        self, name: str, *, unit: Literal["m/s^2", "m/s", "Pa"] | None = None, point: Values | None = None,
+        on: Literal["engine", "frame"] | None = None, transfer_functions: Table | None = None,
+        force: Literal["rigid ground", "frame"] | None = None, band: Values | None = None,
+        weighting: str | Sequence[str] | None = None,
+    ) -> Self:
+        """Return the engine with a receiver.
+
+        A point at which vibration or sound is felt: a handlebar, a seat, an ear.
+
+        Parameters
+        ----------
+        name
+            Name in tables, pictures and messages.
+        unit
+            Unit of the response; that of transfer functions is this unit per newton of mount force.
+        point
+            Position of a point that moves with the engine, or with the frame [m].
+        on
+            Body that the point moves with.
+        transfer_functions
+            CSV files of the transfer functions from mount forces to a receiver, by the direction of its response.
+        force
+            Forces that transfer functions apply to: those on rigid ground if they were measured with the engine on its
+            mounts, those on the moving frame if they were measured without the engine.
+        band
+            Frequencies that count; transfer functions have to cover them, and other frequencies give no response [Hz].
+        weighting
+            Wk, Wd, Wh, A, a CSV file with factors over frequency, or none; one for all directions, or one for each.
+        """
+        return self._with("receivers", "receiver", keys_of(locals()))
+
     def tolerances(
         self, *, residual_unbalance: str | None = None, rotor_mass: Number | None = None, planes: int | None = None,
         law: Literal["uniform", "normal"] | None = None,

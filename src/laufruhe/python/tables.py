@@ -320,6 +320,27 @@ def fluid_track(
     return keys_of(locals())
 
 
+def frame_spring(
+    *, position: Values, stiffness: Values, loss_factor: Value | None = None, damping: Values | None = None,
+) -> Table:
+    """Return a table `frame_spring`.
+
+    Spring between frame and ground.
+
+    Parameters
+    ----------
+    position
+        Where it is, from the crank axis in the middle of the engine: x forward, y to the left, z up [m].
+    stiffness
+        Stiffness along x, y and z [N/m].
+    loss_factor
+        Hysteretic loss factor.
+    damping
+        Viscous damping along x, y and z; none by default [N s/m].
+    """
+    return keys_of(locals())
+
+
 def intervals(
     *, min: Number | None = None, max: Number | None = None, largest_deviation: Number | None = None,
 ) -> Table:
@@ -785,8 +806,8 @@ def stop(
 def term(
     *, quantity: QuantityName, mounts: Sequence[str] | None = None, bearings: Sequence[str] | None = None,
     cylinders: Sequence[str] | None = None, sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
-    operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
-    direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+    receivers: Sequence[str] | None = None, operating_points: Sequence[str] | None = None, orders: Values | None = None,
+    alternating: bool | None = None, direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
     motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
     wanted: Number | None = None, frequency: Value | None = None, weight: Number | None = None,
 ) -> Table:
@@ -808,6 +829,8 @@ def term(
         Sections of the crankshaft that count, named after the discs that they join; all by default.
     webs
         Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
+    receivers
+        Receivers that count, by name; all by default.
     operating_points
         Names of the operating points that count; all by default.
     orders
@@ -852,6 +875,27 @@ def torsion_shaft(
         Hysteretic loss factor: energy lost in a cycle over 2 pi times the energy stored.
     stiffness
         Force for each unit of travel, or torque for each unit of twist [N m/rad].
+    """
+    return keys_of(locals())
+
+
+def transfer_functions(
+    *, x: str | None = None, y: str | None = None, z: str | None = None, sound: str | None = None,
+) -> Table:
+    """Return a table `transfer_functions`.
+
+    CSV files of the transfer functions from mount forces to a receiver, by the direction of its response.
+
+    Parameters
+    ----------
+    x
+        File of the response along x.
+    y
+        File of the response along y.
+    z
+        File of the response along z.
+    sound
+        File of the sound pressure.
     """
     return keys_of(locals())
 

@@ -1,0 +1,191 @@
+"""Response of receivers to the loads of an engine, order by order (Q1-Q4).
+
+A receiver is a point of the engine or its frame, or a transfer function H multiplies mount forces:
+
+    a = (i W)^k G q   or   a = H(W) F,    W = order x speed                               (Q1, Q2)
+
+with k = 2 for acceleration and 1 for velocity. F are the forces on rigid ground (E5) for functions of the whole
+vehicle with its engine: the motion of the frame is then within H (Q3). For functions of the frame without the engine,
+F are the forces on the frame that moves with the engine (Q4):
+
+    [Z + G' k G, -G' k B; -B' k G, Y + B' k B] [q; p] = [w; 0],    F = k (G q - B p)      (Q4)
+
+Z = -W^2 M of the engine, Y = K + i H + i W C - W^2 M of the frame on its springs, k the complex stiffness of the
+mounts, and G, B their motion with engine and frame.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.extensions.receivers.machine import Frame, Quantity, Receiver, Receivers, receivers_of
+from laufruhe.machine import Engine
+from laufruhe.machine.mount import Vector3
+from laufruhe.numerics.arrays import Array, ComplexArray, Mask
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.spectrum import Spectrum, stacked_coefficients
+from laufruhe.physics.elastic_mounts import ElasticMounting, ResonanceError, elastic_mounting
+from laufruhe.physics.mounting import mounting_of
+from laufruhe.physics.rigid_body import carried, moved_wrench, point_motion
+from laufruhe.problem.loads import PointLoads
+
+_DERIVATIVES = {"acceleration": 2, "velocity": 1}
+
+
+def response(engine: Engine, loads: PointLoads, quantity: Quantity) -> Spectrum:
+    """Return the weighted response of all receivers of one quantity, shape (n, receivers, components) [SI].
+
+    `engine` is the engine with the parts that make the loads.
+    """
+    extra = engine.extra(Receivers) or Receivers()
+    spectra = [_of_receiver(receiver, extra.frame, engine, loads) for receiver in receivers_of(engine, quantity)]
+    base, stacked = stacked_coefficients(spectra)
+    return Spectrum(base, np.moveaxis(stacked, 0, 1))
+
+
+def _of_receiver(receiver: Receiver, frame: Frame | None, engine: Engine, loads: PointLoads) -> Spectrum:
+    takes_ground_force = bool(receiver.functions) and not receiver.takes_frame_force
+    source = _ground_forces(receiver, engine, loads) if takes_ground_force else loads.wrench
+    frequencies = source.orders * loads.point.speed / math.tau
+    weights, rows = receiver.weights(frequencies), source.coefficients.reshape(len(frequencies), -1)
+    # the steady load moves nothing
+    used = np.asarray((frequencies > 0.0) & weights.any(axis=1) & rows.any(axis=1))
+    struck: Mask = np.zeros(len(used), dtype=bool)
+    in_frequency = loads.fidelity.mounts == "frequency"
+    if in_frequency and loads.mount_forces is not None and (takes_ground_force or frame is None):
+        # on an undamped resonance the forces on rigid ground are infinite
+        struck = np.asarray(used & ~np.isfinite(loads.mount_forces.coefficients).all(axis=(1, 2)))
+    used &= ~struck
+    out = np.zeros(weights.shape, dtype=complex)
+    if not receiver.functions:
+        out[used] = _of_point(receiver, frame, engine, loads, used)
+    elif takes_ground_force:
+        out[used] = _transferred(receiver, frequencies[used], rows[used])
+    elif frame is not None:
+        moved = _Coupled.of(frame, engine, loads).solved(math.tau * frequencies[used], rows[used])
+        out[used] = _transferred(receiver, frequencies[used], moved.forces)
+    out *= weights
+    out[struck] = np.inf
+    return Spectrum(source.base, out)
+
+
+def _ground_forces(receiver: Receiver, engine: Engine, loads: PointLoads) -> Spectrum:
+    if loads.mount_forces is not None:
+        return loads.mount_forces
+    mounting = mounting_of(engine, loads.fidelity)
+    if mounting is None:
+        raise ModelError(f"receiver '{receiver.name}' needs mounts; add [mounts]")
+    return mounting.forces(loads.wrench, loads.point.speed)
+
+
+def _transferred(receiver: Receiver, frequencies: Array, forces: ComplexArray) -> ComplexArray:
+    # response to mount forces (n, 3 mounts), shape (n, components)
+    parts = [
+        np.zeros(len(forces)) if function is None else np.sum(function.at(frequencies) * forces, axis=1)
+        for function in receiver.functions
+    ]
+    return np.stack(parts, axis=-1)
+
+
+def _of_point(receiver: Receiver, frame: Frame | None, engine: Engine, loads: PointLoads, used: Mask) -> ComplexArray:
+    """Return acceleration or velocity of a point at the orders of the wrench in a mask, shape (orders, 3)."""
+    wrenches, omegas = loads.wrench.coefficients[used], loads.wrench.orders[used] * loads.point.speed
+    if frame is not None:
+        moved = _Coupled.of(frame, engine, loads).solved(omegas, wrenches)
+        body, motion = (frame.body, moved.frame) if receiver.on_frame else (engine.block, moved.engine)
+    else:
+        mounting, body = mounting_of(engine, loads.fidelity), engine.block
+        if isinstance(mounting, ElasticMounting):
+            motion = mounting.responses(omegas, wrenches) @ mounting.modes.shapes.T
+        elif loads.fidelity.mounts == "rigid":
+            # elastic mounts that are taken for rigid do not travel
+            motion = np.zeros(wrenches.shape, dtype=complex)
+        else:
+            raise ModelError(f"receiver '{receiver.name}' {_IN_FREQUENCY}")
+    if body is None or receiver.point is None:
+        raise ModelError(f"receiver '{receiver.name}' needs elastic mounts; add [block] and elastic [mounts]")
+    factors = (1j * omegas) ** _DERIVATIVES[receiver.quantity]
+    return np.asarray(factors[:, None] * (motion @ _motion_at(receiver.point, body.centre_of_gravity).T))
+
+
+_IN_FREQUENCY = 'needs mounts in the frequency domain; leave fidelity.mounts out, or write "frequency"'
+
+
+def _motion_at(point: Vector3, centre: Vector3) -> Array:
+    return np.asarray(point_motion(NUMBERS, np.array(point) - np.array(centre)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    # motion of both bodies at their centres of gravity, shape (n, 6), and forces on the frame, shape (n, 3 mounts)
+    engine: ComplexArray
+    frame: ComplexArray
+    forces: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Coupled:
+    """Engine on its mounts on a frame on its springs, in the modes of the engine and the motion of the frame (Q4)."""
+
+    mounting: ElasticMounting
+    frame: Frame
+    shapes: Array
+
+    @classmethod
+    def of(cls, frame: Frame, engine: Engine, loads: PointLoads) -> _Coupled:
+        """Return the two bodies of an engine with a frame."""
+        fidelity = loads.fidelity
+        if fidelity.mounts != "frequency" or engine.block is None:
+            raise ModelError(f"a frame under the engine {_IN_FREQUENCY}")
+        mounting = elastic_mounting(engine.block, engine.mounts)
+        modes = range(6) if fidelity.modes is None else [mode - 1 for mode in fidelity.modes]
+        return cls(mounting, frame, mounting.modes.shapes[:, list(modes)])
+
+    def solved(self, omegas: Array, wrenches: ComplexArray) -> _Motion:
+        """Return the motion under wrenches about the origin, shape (n, 6), at positive angular frequencies [rad/s]."""
+        mounting, frame, count = self.mounting, self.frame, self.shapes.shape[1]
+        springs = self._springs(omegas)
+        places = [mount.position for mount in mounting.mounts]
+        of_engine = np.concatenate(list(mounting.motions)) @ self.shapes
+        of_frame = np.concatenate([_motion_at(place, frame.body.centre_of_gravity) for place in places])
+        # deflection of every mount per motion of both bodies
+        stretch = np.concatenate([of_engine, -of_frame], axis=1)
+        inertia = np.zeros((count + 6, count + 6))
+        inertia[:count, :count] = self.shapes.T @ mounting.block.mass_matrix @ self.shapes
+        inertia[count:, count:] = frame.body.mass_matrix
+        impedance = stretch.T @ springs @ stretch - omegas[:, None, None] ** 2 * inertia
+        for spring in frame.springs:
+            motion = _motion_at(spring.position, frame.body.centre_of_gravity)
+            elastic, lossy, viscous = (
+                carried(motion, matrix)
+                for matrix in (spring.stiffness_matrix, spring.loss_matrix, spring.damping_matrix)
+            )
+            impedance[:, count:, count:] += elastic + 1j * lossy + 1j * omegas[:, None, None] * viscous
+        drive = np.zeros((len(omegas), count + 6), dtype=complex)
+        drive[:, :count] = wrenches @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity).T @ self.shapes
+        try:
+            moved: ComplexArray = np.linalg.solve(impedance, drive[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            raise ResonanceError(
+                "engine and frame are driven at a natural frequency and nothing damps it; give mounts or frame a loss "
+                "factor or damping"
+            ) from None
+        forces = np.einsum("nij,nj->ni", springs @ stretch, moved)
+        return _Motion(moved[:, :count] @ self.shapes.T, moved[:, count:], np.asarray(forces))
+
+    def _springs(self, omegas: Array) -> ComplexArray:
+        """Return the complex stiffness of all mounts, shape (n, 3 mounts, 3 mounts) [N/m]."""
+        mounting, size = self.mounting, 3 * len(self.mounting.mounts)
+        total = np.zeros((len(omegas), size, size), dtype=complex)
+        for k in range(len(mounting.mounts)):
+            part = slice(3 * k, 3 * k + 3)
+            total[:, part, part] = mounting.springs[k] + 1j * mounting.losses[k]
+            total[:, part, part] += 1j * omegas[:, None, None] * mounting.dampers[k]
+        if mounting.dynamic:
+            axes = mounting.dynamic.directions
+            total += np.einsum("rd,nd,sd->nrs", axes, mounting.dynamic.added(omegas), axes)
+        return total
