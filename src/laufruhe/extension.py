@@ -98,7 +98,7 @@ _OF_SIZES = (
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
-    "commands": {"page": "served_page"},
+    "commands": {"page": "served_page", "balance": "balancing"},
     "keys": {
         "torsion": "torsion",
         "tolerances": "robust",
@@ -109,6 +109,8 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "crankcase": "workshop",
         "receivers": "receivers",
         "frame": "receivers",
+        "bob_weights": "balancing",
+        "correction": "balancing",
     },
     "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},

@@ -26,6 +26,7 @@ VIEW = {"viewport": {"width": 1280, "height": 900}, "device_scale_factor": 0.7}
 # arguments of the command; picture that it draws; name under docs/pictures
 WANTED = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
+    ("balance", "vee-eight-balance-job"): {"planes": "balance-job"},
     ("study", "tractor-study"): {name: f"tractor-study-{name}" for name in ("fig-10", "fig-22", "reciprocating-mass")},
     ("study", "torsion-pareto"): {"firing-order": "torsion-pareto"},
     ("study", "bearing-pareto"): {"mount-force": "bearing-pareto"},

@@ -579,6 +579,92 @@ class EngineParts(Parts):
         """
         return self._with("search", "search", keys_of(locals()))
 
+    def bob_weights(
+        self, *, balance_factor: Number, big_end: Number | Values, bearing_shells: Number | Values | None = None,
+        piston: Number | Values | None = None, pin: Number | Values | None = None, rings: Number | Values | None = None,
+        locks: Number | Values | None = None, small_end: Number | Values | None = None, oil: Number | None = None,
+    ) -> Self:
+        """Return the engine with bob weights.
+
+        Parts on the throws, for the bob weights that stand for them while the crankshaft is balanced.
+
+        Parameters
+        ----------
+        balance_factor
+            Share of the reciprocating masses in a bob weight.
+        big_end
+            Rotating mass of the rod; one for all cylinders, or one for each [kg].
+        bearing_shells
+            Both bearing shells of a rod [kg].
+        piston
+            Piston; without piston and small end, the reciprocating mass of [engine] [kg].
+        pin
+            Piston pin [kg].
+        rings
+            Piston rings of a cylinder [kg].
+        locks
+            Locks of a piston pin [kg].
+        small_end
+            Reciprocating mass of the rod [kg].
+        oil
+            Oil in a throw [kg].
+        """
+        return self._with("bob_weights", "bob_weights", keys_of(locals()))
+
+    def correction(
+        self, *, planes: Sequence[Table], density: Number, drills: Values, depth_step: Number, max_depth: Number,
+        goal: Literal["fewest holes", "least residual"] | None = None,
+        direction: Literal["axial", "radial"] | None = None, point_angle: Number | None = None,
+        min_depth: Number | None = None, wall: Number | None = None, max_holes: int | None = None,
+        slugs: Table | None = None, residual_unbalance: str | None = None, rotor_mass: Number | None = None,
+        service_speed: Number | None = None, centre_of_mass: Number | None = None, zero_mark: Number | None = None,
+        machine_counts: Literal["with rotation", "against rotation"] | None = None,
+    ) -> Self:
+        """Return the engine with correction.
+
+        Holes and slugs that correct the unbalance of a rotor in two planes.
+
+        Parameters
+        ----------
+        planes
+            The two correction planes.
+        density
+            Density of the rotor [kg/m^3].
+        drills
+            Diameters of the drills [m].
+        depth_step
+            Holes are whole multiples of it deep, to the end of the full diameter [m].
+        max_depth
+            Largest depth of a hole [m].
+        goal
+            Fewest holes that leave a permitted residual, or the least residual of all designs.
+        direction
+            Direction of the holes: along the axis, or towards it.
+        point_angle
+            Included angle of the drill's point; by default holes have a flat bottom [rad].
+        min_depth
+            Least depth of a hole [m].
+        wall
+            Least material between two holes, and to the edge of a sector [m].
+        max_holes
+            Largest number of holes in a plane.
+        slugs
+            Slugs of heavy metal, which fill holes of their diameter.
+        residual_unbalance
+            Permitted in each plane: an unbalance, or the share of a plane in a grade of ISO 21940-11.
+        rotor_mass
+            Mass of the rotor that has the grade [kg].
+        service_speed
+            Fastest service speed, for the grade [rad/s].
+        centre_of_mass
+            Place of the centre of mass along the axis; by default the planes have equal shares in the grade [m].
+        zero_mark
+            Angle of the machine's zero mark on the crank [rad].
+        machine_counts
+            Sense in which the machine counts its angles.
+        """
+        return self._with("correction", "correction", keys_of(locals()))
+
     def frame(
         self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None,
         inertia_products: Values | None = None, springs: Sequence[Table] | None = None,

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from laufruhe.problem.goals import QuantityName
-from laufruhe.problem.number_types import Number, Table, Value, Values
+from laufruhe.problem.number_types import Array, Number, Table, Value, Values
 from laufruhe.python.keys import keys_of
 
 
@@ -360,6 +360,28 @@ def intervals(
     return keys_of(locals())
 
 
+def measured(
+    *, angle: Value, unbalance: Value | complex | None = None, mass: Value | complex | None = None,
+    radius: Value | None = None,
+) -> Table:
+    """Return a table `measured`.
+
+    Unbalance that the balancing machine shows in a plane.
+
+    Parameters
+    ----------
+    angle
+        Angle of the heavy spot, as read at the machine [rad].
+    unbalance
+        Reading of a machine that shows an unbalance [kg m].
+    mass
+        Reading of a machine that shows a mass, at the radius [kg].
+    radius
+        Radius that the machine is set to [m].
+    """
+    return keys_of(locals())
+
+
 def mount(
     name: str | None = None, *, position: Values | None = None, relative_stiffness: Values | None = None,
     turned: Values | None = None, stiffness: Values | None = None, loss_factor: Value | None = None,
@@ -461,6 +483,45 @@ def piston_pin(
         Share of the length of the pin that the bosses hold.
     span
         Distance between the middles of the bosses; by default it follows from in_bosses [m].
+    """
+    return keys_of(locals())
+
+
+def plane(
+    name: str, *, measured: Table, radius: Value, x: Value | None = None, angles: Values | None = None,
+    places: int | None = None, first_place: Value | None = None, allowed: Sequence[Values] | Array | None = None,
+    solid: Sequence[Values] | Array | None = None, max_depth: Value | None = None,
+    residual_unbalance: Value | None = None,
+) -> Table:
+    """Return a table `plane`.
+
+    Correction plane: a counterweight or disc, its unbalance, and the places for holes.
+
+    Parameters
+    ----------
+    name
+        Name of the plane in lists and pictures.
+    measured
+        Unbalance before correction, as the machine shows it.
+    radius
+        Radius of the hole circle, or of the surface that radial holes start from [m].
+    x
+        Place along the axis; needed with the centre of mass [m].
+    angles
+        Angles of the places on the crank, counted with the rotation [rad].
+    places
+        Number of places in equal steps, in place of their angles.
+    first_place
+        Angle of the first of places in equal steps, on the crank [rad].
+    allowed
+        Sectors for holes, each from an angle on the crank to another, with the rotation; by default the whole circle
+        [rad].
+    solid
+        Sectors that no hole may touch [rad].
+    max_depth
+        Largest depth in this plane, in place of that of all [m].
+    residual_unbalance
+        Permitted residual unbalance of this plane [kg m].
     """
     return keys_of(locals())
 
@@ -751,6 +812,23 @@ def slider_crank(
         Mass at the crank pin that is not balanced [kg].
     rod_inertia_deficit
         What two masses at the ends of the rod lack of its inertia [kg m^2].
+    """
+    return keys_of(locals())
+
+
+def slugs(
+    *, density: Value, diameters: Values,
+) -> Table:
+    """Return a table `slugs`.
+
+    Slugs of heavy metal, which fill holes of their diameter.
+
+    Parameters
+    ----------
+    density
+        Density of the heavy metal [kg/m^3].
+    diameters
+        Diameters of the slugs, and of their holes [m].
     """
     return keys_of(locals())
 

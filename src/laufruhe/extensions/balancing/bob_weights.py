@@ -1,0 +1,124 @@
+"""Bob weights: masses that stand for rods and pistons while a crankshaft is balanced, and their card (U1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+from laufruhe.errors import counted
+from laufruhe.machine import Engine
+from laufruhe.machine.extra import Extra
+from laufruhe.present.numbers import fixed, share
+from laufruhe.present.tables import Table
+from laufruhe.report.section import Section
+from laufruhe.solvers.result import Result
+
+ROTATING = ("big_end", "bearing_shells")
+RECIPROCATING = ("piston", "pin", "rings", "locks", "small_end")
+ENGINE_MASS = "reciprocating_mass"
+CARD = "bob-weights"
+
+
+@dataclass(frozen=True)
+class BobWeights(Extra):
+    """Masses of the parts on the throws.
+
+    Attributes
+    ----------
+    factor
+        Balance factor: share of the reciprocating masses.
+    oil
+        Mass of the oil in a throw [kg].
+    parts
+        Names of the parts, each with its mass at every cylinder [kg].
+    throws
+        Cylinders of each crank pin, as indices from zero.
+    """
+
+    name: ClassVar[str] = "bob weights"
+    factor: float
+    oil: float
+    parts: tuple[tuple[str, tuple[float, ...]], ...]
+    throws: tuple[tuple[int, ...], ...]
+
+    def scaled(self, _: float, mass: float) -> Self:
+        """Return the parts with their masses multiplied by a factor."""
+        parts = tuple((name, tuple(mass * one for one in masses)) for name, masses in self.parts)
+        return replace(self, oil=mass * self.oil, parts=parts)
+
+    def shares(self, throw: int) -> Mapping[str, tuple[float, float]]:
+        """Return the mass of each part on a throw [kg], and the share of it that the bob weight has (U1)."""
+        masses = {name: sum(masses[k] for k in self.throws[throw]) for name, masses in self.parts}
+        shares = {name: (mass, 1.0 if name in ROTATING else self.factor) for name, mass in masses.items()}
+        return {**shares, "oil": (self.oil, 1.0)}
+
+    def mass(self, throw: int) -> float:
+        """Return the bob weight of a throw [kg] (U1)."""
+        return sum(mass * part for mass, part in self.shares(throw).values())
+
+
+def card(engine: Engine, weights: BobWeights) -> Table:
+    """Return the card of bob weights [g], with a column for every crank pin, or one for all if they are equal."""
+    throws = [weights.shares(k) for k in range(len(weights.throws))]
+    radii = [engine.slider_cranks[on_pin[0]].crank_radius for on_pin in weights.throws]
+    names = [", ".join(engine.slider_cranks[i].name for i in on_pin) for on_pin in weights.throws]
+    if all(pair == (throws[0], radii[0]) for pair in zip(throws, radii, strict=True)):
+        names, throws, radii = [f"each of {counted(len(throws), 'crank pin')}"], throws[:1], radii[:1]
+    columns = {name: [shares[name] for shares in throws] for name in throws[0]}
+    rows = [
+        [name.replace("_", " "), share(cells[0][1]), *(fixed(1e3 * mass * part, 2) for mass, part in cells)]
+        for name, cells in columns.items()
+        if any(mass for mass, _ in cells)
+    ]
+    totals = [weights.mass(k) for k in range(len(throws))]
+    rows.append(["bob weight", "", *(fixed(1e3 * mass, 2) for mass in totals)])
+    rows.append(["unbalance [g mm]", "", *(fixed(1e6 * m * r, 0) for m, r in zip(totals, radii, strict=True))])
+    note = (
+        "Grams on a crank pin, all rods of the pin counted: rotating masses and oil in full, reciprocating masses with "
+        f"the balance factor. The unbalance is that at the crank radius. {_difference(engine, weights)}"
+    )
+    return Table(("part", "share", *names), rows, title="Bob weights [g]", note=note, file=CARD)
+
+
+def _difference(engine: Engine, weights: BobWeights) -> str:
+    # the engine of the file may have other masses
+    listed = [sum(masses[k] for name, masses in weights.parts if name not in ROTATING)
+              for k in range(len(engine.slider_cranks))]  # fmt: skip
+    worst = max(
+        (abs(mass - part.reciprocating_mass), part.name, mass, part.reciprocating_mass)
+        for mass, part in zip(listed, engine.slider_cranks, strict=True)
+    )
+    if worst[0] <= 1e-4 * worst[3]:
+        return "The reciprocating parts have the mass of [engine]."
+    return (
+        f"The reciprocating parts of {worst[1]} have {fixed(1e3 * worst[2], 1)} g, "
+        f"but [engine] has {fixed(1e3 * worst[3], 1)} g."
+    )
+
+
+def record(engine: Engine, weights: BobWeights) -> Mapping[str, Any]:
+    """Return the bob weights for JSON [kg]."""
+    return {
+        "balance_factor": weights.factor,
+        "throws": [
+            {"cylinders": [engine.slider_cranks[i].name for i in on_pin], "bob_weight": weights.mass(k),
+             "parts": {name: {"mass": mass, "share": part} for name, (mass, part) in weights.shares(k).items()}}
+            for k, on_pin in enumerate(weights.throws)
+        ],
+    }  # fmt: skip
+
+
+def _weights(result: Result) -> BobWeights:
+    weights = result.final.engine.extra(BobWeights)
+    assert weights is not None
+    return weights
+
+
+SECTION = Section(
+    "bob_weights",
+    lambda result: result.final.engine.extra(BobWeights) is not None,
+    lambda result: [card(result.final.engine, _weights(result))],
+    lambda result: record(result.final.engine, _weights(result)),
+    (CARD,),
+)

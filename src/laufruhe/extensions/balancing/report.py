@@ -1,0 +1,359 @@
+"""Report of a balancing job: holes as read at the machine, residuals, proof, picture and card."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from laufruhe.cli.screen import Output, typed
+from laufruhe.errors import counted
+from laufruhe.extensions.balancing.bob_weights import CARD, BobWeights, card, record
+from laufruhe.extensions.balancing.file import Correction, Job, load_job
+from laufruhe.extensions.balancing.physics import Drilling, Hole, Plane
+from laufruhe.extensions.balancing.search import PlaneResult, correct
+from laufruhe.files.reader import display_path
+from laufruhe.numerics.arrays import Array
+from laufruhe.plots.picture import save_picture
+from laufruhe.present.numbers import DASH, fixed, number, trimmed
+from laufruhe.present.picture import Area, Axis, Line, Mark, Panel, Picture, Words
+from laufruhe.present.tables import Table
+from laufruhe.report import files
+from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
+from laufruhe.report.screen import show_document
+from laufruhe.report.strict_json import strict, versions
+from laufruhe.report.table_files import write_csv
+from laufruhe.report.web_page import as_html
+
+HOLES, PICTURE = "holes", "planes"
+NAMES = (
+    files.REPORT,
+    files.PAGE,
+    files.RESULT,
+    f"{HOLES}.csv",
+    f"{CARD}.csv",
+    *(f"{PICTURE}.{kind}" for kind in files.KINDS),
+)
+CAPTION = "The two planes to scale, seen from the front, with the holes."
+_COLOURS = {"hole": "sky", "slug": "orange"}
+GRAM_MM = 1e6
+"""Factor from kg m to g mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Balanced:
+    """Correction with the holes of both planes."""
+
+    correction: Correction
+    planes: tuple[PlaneResult, ...]
+
+    @property
+    def is_met(self) -> bool:
+        """True if both residuals are permitted."""
+        return all(plane.is_met for plane in self.planes)
+
+    @property
+    def holes(self) -> Iterator[tuple[Plane, float, Hole]]:
+        """Plane, angle on the crank [rad] and hole, in the order of planes and readings."""
+        for result in self.planes:
+            entries = [(result.plane.angles[place], result.plane.holes[place][k]) for place, k in result.design]
+            for angle, hole in sorted(entries, key=lambda entry: self.correction.dial.reading(entry[0])):
+                yield result.plane, angle, hole
+
+
+def balanced(path: Path, out: Path | None, kinds: Sequence[str]) -> tuple[Output, Callable[[], str], bool]:
+    """Decide the holes of a file and write its results.
+
+    Return a function that shows the report, one that returns JSON, and True if both residuals are permitted.
+    """
+    job = load_job(path)
+    folder = out or Path("results") / f"{display_path(path).stem}-balance"
+    option = "results" if out is None else "--out"
+    with files.staged(files.FileSet(folder, option, "balance", NAMES)) as stage:
+        answer = None if job.correction is None else decide(job.correction)
+        pictures = {}
+        if answer is not None:
+            write_csv(_numbers(answer), stage / f"{HOLES}.csv")
+            pictures[PICTURE] = save_picture(picture(job, answer), stage / PICTURE, kinds)
+        if (sheet := _card(job)) is not None:
+            write_csv(sheet, stage / f"{CARD}.csv")
+        document = report(job, answer, typed("laufruhe", "balance", str(path)))
+        text = as_json(job, answer)
+        files.write(stage / files.RESULT, text)
+        files.write(stage / files.REPORT, document.as_markdown(f".{kinds[0]}"))
+        files.write(stage / files.PAGE, as_html(document, pictures))
+    is_met = answer is None or answer.is_met
+    return lambda stream: show_document(document, stream, folder, files.PAGE), lambda: text, is_met
+
+
+def decide(correction: Correction) -> Balanced:
+    """Return the holes of both planes; each plane is decided alone, because its holes change no other plane."""
+    return Balanced(
+        correction,
+        tuple(
+            correct(plane, correction.max_holes, correction.is_fewest, gap)
+            for plane, gap in zip(correction.planes, correction.gaps, strict=True)
+        ),
+    )
+
+
+def report(job: Job, answer: Balanced | None, command: str) -> Document:
+    """Return the page of a balancing job."""
+    return Document(job.title, tuple(_blocks(job, answer, command)))
+
+
+def _blocks(job: Job, answer: Balanced | None, command: str) -> Iterator[Block]:
+    if job.source:
+        yield Paragraph(f"Source: {job.source}.")
+    if job.assumptions:
+        yield Bullets("Assumptions:", job.assumptions)
+    if answer is not None:
+        yield Heading("Correction")
+        yield Paragraph(headline(answer))
+        yield _hole_table(answer)
+        yield Illustration(PICTURE, CAPTION)
+        yield _plane_table(answer)
+        yield _count_table(answer)
+        yield Paragraph(_proof(answer))
+    if (sheet := _card(job)) is not None:
+        yield sheet
+    yield Heading("Reproduce")
+    yield Code(command)
+    yield Paragraph("Made with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".")
+
+
+def headline(answer: Balanced) -> str:
+    """Return the result in a sentence."""
+    count = counted(sum(len(result.design) for result in answer.planes), "hole")
+    if answer.is_met:
+        goal = "the fewest" if answer.correction.is_fewest else "the least residual"
+        is_proven = all(r.is_fewest if answer.correction.is_fewest else r.is_least for r in answer.planes)
+        proof = "proven" if is_proven else "not proven"
+        return f"{count[:1].upper()}{count[1:]} correct both planes: {goal} ({proof})."
+    names = " and ".join(f"'{r.plane.name}'" for r in answer.planes if not r.is_met)
+    is_proven = all(r.is_fewest for r in answer.planes if not r.is_met)
+    what = "is proven to correct" if is_proven else "was found that corrects"
+    maximum = counted(answer.correction.max_holes, "hole")
+    return (
+        f"No design with at most {maximum} in a plane {what} {names} to a permitted residual; "
+        "the design with the least residual follows."
+    )
+
+
+def _proof(answer: Balanced) -> str:
+    correction = answer.correction
+    scales = [plane.permitted or abs(plane.initial) or 1.0 for plane in correction.planes]
+    gap = trimmed(100.0 * max(gap / scale for gap, scale in zip(correction.gaps, scales, strict=True)))
+    what = "permitted residual" if correction.rule else "initial unbalance or permitted residual"
+    return (
+        "Every set of places has a lower bound of its residual; sets that may hold a better design are enumerated. "
+        f"A residual counts as least if no other is better by {gap} % of the {what}."
+    )
+
+
+def _hole_table(answer: Balanced) -> Table:
+    rows = [
+        (f"{k}", plane.name, _kind(hole), fixed(1e3 * hole.diameter, 2), fixed(1e3 * hole.depth, 2),
+         fixed(math.degrees(answer.correction.dial.reading(angle)), 1), fixed(math.degrees(angle) % 360.0, 1),
+         fixed(1e3 * answer.correction.drilling.mass(hole.diameter, hole.depth, hole.filled), 2, "+"),
+         fixed(GRAM_MM * hole.change, 1, "+"))
+        for k, (plane, angle, hole) in enumerate(answer.holes, 1)
+    ]  # fmt: skip
+    head = ("hole", "plane", "kind", "diameter [mm]", "depth [mm]", "angle at the machine [deg]",
+            "angle on the crank [deg]", "mass [g]", "unbalance [g mm]")  # fmt: skip
+    drilling, dial = answer.correction.drilling, answer.correction.dial
+    way = "towards the axis" if drilling.is_radial else "along the axis"
+    sense = "with" if dial.sense > 0.0 else "against"
+    zero = fixed(math.degrees(dial.zero) % 360.0, 1)
+    point = f" The drill's point of {fixed(math.degrees(drilling.point_angle), 0)} deg goes deeper." * (
+        drilling.point_angle < math.pi
+    )
+    note = (
+        f"Holes {way}. Depth to the end of the full diameter.{point} "
+        f"The machine counts {sense} the rotation from the zero mark, at {zero} deg on the crank."
+    )
+    return Table(head, rows, title="Holes", left=(1, 2), note=note)
+
+
+def _kind(hole: Hole) -> str:
+    return "slug" if hole.filled else "hole"
+
+
+def _numbers(answer: Balanced) -> Table:
+    head = ("hole", "plane", "kind", "diameter [mm]", "depth [mm]", "angle at the machine [deg]",
+            "angle on the crank [deg]", "radius [mm]", "mass [g]", "unbalance [g mm]")  # fmt: skip
+    rows = [
+        [k, entry["plane"], entry["kind"], _decimal(1e3 * entry["diameter"]), _decimal(1e3 * entry["depth"]),
+         *(_decimal(math.degrees(entry[key])) for key in ("machine_angle", "crank_angle")),
+         _decimal(1e3 * entry["radius"]), 1e3 * entry["mass"], GRAM_MM * entry["unbalance"]]
+        for k, entry in enumerate(_hole_records(answer), 1)
+    ]  # fmt: skip
+    return Table(head, rows)
+
+
+def _decimal(value: float) -> float:
+    # a depth of 12 mm is not 12.000000000000002
+    return round(value, 9)
+
+
+def _hole_records(answer: Balanced) -> list[dict[str, Any]]:
+    drilling, dial = answer.correction.drilling, answer.correction.dial
+    return [
+        {"plane": plane.name, "kind": _kind(hole), "diameter": hole.diameter, "depth": hole.depth,
+         "machine_angle": dial.reading(angle), "crank_angle": angle % math.tau, "radius": plane.radius,
+         "mass": drilling.mass(hole.diameter, hole.depth, hole.filled), "unbalance": hole.change}
+        for plane, angle, hole in answer.holes
+    ]  # fmt: skip
+
+
+def _plane_table(answer: Balanced) -> Table:
+    dial = answer.correction.dial
+    rows = [
+        (result.plane.name, number(GRAM_MM * abs(result.plane.initial)), _angle(result.plane.initial, dial.reading),
+         f"{len(result.design)}", number(GRAM_MM * abs(result.residual), 3), _angle(result.residual, dial.reading),
+         DASH if result.plane.permitted is None else number(GRAM_MM * result.plane.permitted),
+         DASH if result.plane.permitted is None else "yes" if result.is_met else "no")
+        for result in answer.planes
+    ]  # fmt: skip
+    head = ("plane", "before [g mm]", "at [deg]", "holes", "residual [g mm]", "at [deg]", "permitted [g mm]", "met")
+    note = "Angles as read at the machine."
+    rule = f" Permitted: {answer.correction.rule}." if answer.correction.rule else ""
+    return Table(head, rows, title="Unbalance of the planes", note=note + rule)
+
+
+def _angle(unbalance: complex, reading: Callable[[float], float]) -> str:
+    return fixed(math.degrees(reading(float(np.angle(unbalance)))), 1) if unbalance else DASH
+
+
+def _count_table(answer: Balanced) -> Table:
+    numbers = max(len(result.counts) for result in answer.planes)
+    rows = [
+        (f"{holes}", *(cell for result in answer.planes for cell in _count_cells(result, holes)))
+        for holes in range(numbers)
+    ]
+    head = ["holes", *(f"{result.plane.name}: {text}" for result in answer.planes
+                       for text in ("least residual [g mm]", "lower bound [g mm]"))]  # fmt: skip
+    note = "Least residual with exactly so many holes. A dash: not needed, or no such design."
+    return Table(head, rows, title="Holes against residual", note=note, left=0)
+
+
+def _count_cells(result: PlaneResult, holes: int) -> tuple[str, str]:
+    if holes >= len(result.counts):
+        return DASH, DASH
+    return tuple(number(GRAM_MM * one, 4) for one in (result.counts[holes].value, result.counts[holes].bound))  # type: ignore[return-value]
+
+
+def _card(job: Job) -> Table | None:
+    weights = None if job.problem is None else job.problem.engine.extra(BobWeights)
+    return None if job.problem is None or weights is None else card(job.problem.engine, weights)
+
+
+def as_json(job: Job, answer: Balanced | None) -> str:
+    """Return the result as JSON in SI units; angles in rad."""
+    content: dict[str, Any] = {"title": job.title, "versions": versions()}
+    if answer is not None:
+        content["correction"] = {
+            "goal": "fewest holes" if answer.correction.is_fewest else "least residual",
+            "permitted": answer.correction.rule or None,
+            "met": answer.is_met,
+            "planes": [_plane_record(result, gap) for result, gap in
+                       zip(answer.planes, answer.correction.gaps, strict=True)],
+            "holes": _hole_records(answer),
+        }  # fmt: skip
+    weights = None if job.problem is None else job.problem.engine.extra(BobWeights)
+    if job.problem is not None and weights is not None:
+        content["bob_weights"] = record(job.problem.engine, weights)
+    return strict(content)
+
+
+def _plane_record(result: PlaneResult, gap: float) -> dict[str, Any]:
+    plane = result.plane
+    before, after = (
+        {"unbalance": abs(one), "crank_angle": float(np.angle(one)) % math.tau}
+        for one in (plane.initial, result.residual)
+    )
+    return {
+        "name": plane.name, "before": before, "after": after, "permitted": plane.permitted, "met": result.is_met,
+        "fewest_proven": result.is_fewest, "least_proven": result.is_least, "gap": gap,
+        "counts": [
+            {"holes": k, "residual": count.value, "bound": count.bound, "proven": count.proven}
+            for k, count in enumerate(result.counts)
+        ],
+    }  # fmt: skip
+
+
+def picture(job: Job, answer: Balanced) -> Picture:
+    """Return the picture of both planes, to one scale."""
+    reach = 1.75 * max(plane.radius for plane in answer.correction.planes)
+    panels, first = [], 1
+    for result in answer.planes:
+        holes = [(angle, hole) for plane, angle, hole in answer.holes if plane is result.plane]
+        panels.append(_panel(result, holes, first, answer.correction, 1e3 * reach))
+        first += len(holes)
+    legend: list[Mark] = [Line(colour="vermilion", label="unbalance before, at its angle", width=2.0),
+                          Line(colour="grey", label="place without a hole", width=0.0, marker="+")]  # fmt: skip
+    if any(plane.solid for plane in answer.correction.planes):
+        legend.append(Line(colour="ink", label="sector without holes", width=3.0))
+    kinds = {_kind(hole) for _, _, hole in answer.holes}
+    legend += [Area(colour=_COLOURS[kind], label=kind) for kind in _COLOURS if kind in kinds]
+    view = "Seen from the front, where the crank turns clockwise; numbers are those of the list of holes."
+    words = f"{headline(answer)} {view}"
+    source = f"{job.source}. " if job.source else ""
+    return Picture(job.title, words, panels, f"{source}Computed with Laufruhe.", (4.0, 4.0), 2, 0.8, legend)
+
+
+def _panel(
+    result: PlaneResult, holes: Sequence[tuple[float, Hole]], first: int, correction: Correction, reach: float
+) -> Panel:
+    plane, radius = result.plane, 1e3 * result.plane.radius
+    turn = np.linspace(0.0, math.tau, 181)
+    marks: list[Mark] = [_line(radius * _unit(turn), "faint", 0.8)]
+    for low, high in plane.solid:
+        marks.append(_line(radius * _unit(np.linspace(low, high, 91)), "ink", 3.0))
+    occupied = {angle for angle, _ in holes}
+    idle = [angle for angle in plane.angles if angle not in occupied]
+    marks.append(replace(_line(radius * _unit(np.array(idle)), "grey", 0.0), marker="+", size=5.0))
+    for k, (angle, hole) in enumerate(holes, first):
+        marks += _hole_marks(angle, hole, radius, correction.drilling)
+        place = (radius + 0.5e3 * hole.diameter + 0.05 * reach) * _unit(np.array([angle]))[0]
+        marks.append(Words(place[0], place[1], f"{k}", across="center"))
+    if plane.initial:
+        spot = _unit(np.array([float(np.angle(plane.initial))]))[0]
+        marks.append(_line(np.array([0.0 * spot, 0.8 * radius * spot]), "vermilion", 2.0))
+    zero = correction.dial.zero
+    is_one = math.isclose(math.cos(zero), 1.0, abs_tol=1e-9)
+    for angle, text in ((0.0, "0° crank and machine"),) if is_one else ((0.0, "0° crank"), (zero, "0° machine")):
+        ends = reach * np.array([[0.76], [0.81], [0.83]]) * _unit(np.array([angle]))
+        marks.append(_line(ends[:2], "faint", 1.2))
+        across = "center" if abs(ends[2, 0]) < 0.05 * reach else "left" if ends[2, 0] > 0.0 else "right"
+        marks.append(Words(ends[2, 0], ends[2, 1], text, "faint", across, "bottom" if ends[2, 1] > 0.0 else "top"))
+    residual, before = (number(GRAM_MM * abs(one), 3) for one in (result.residual, plane.initial))
+    title = f"{plane.name}: {before} g mm before, {residual} g mm after"
+    axis = Axis("mm", (-reach, reach))
+    return Panel(marks, axis, axis, title)
+
+
+def _unit(angles: Array) -> Array:
+    # across and up, seen from the front: angles count clockwise from the top (C3)
+    return np.column_stack([np.sin(angles), np.cos(angles)])
+
+
+def _line(points: Array, colour: str, width: float) -> Line:
+    return Line(points[:, 0], points[:, 1], colour, width=width)
+
+
+def _hole_marks(angle: float, hole: Hole, radius: float, drilling: Drilling) -> list[Mark]:
+    colour, half = _COLOURS[_kind(hole)], 0.5e3 * hole.diameter
+    out, across = _unit(np.array([angle, angle + 0.5 * math.pi]))
+    if drilling.is_radial:
+        floor, tip = radius - 1e3 * hole.depth, radius - 1e3 * (hole.depth + drilling.point_height(hole.diameter))
+        corners = [(radius, half), (floor, half), (tip, 0.0), (floor, -half), (radius, -half), (radius, half)]
+        return [_line(np.array([along * out + side * across for along, side in corners]), colour, 2.0)]
+    steps = np.linspace(-half, half, 61)
+    heights = np.sqrt(np.maximum(half**2 - steps**2, 0.0))
+    middle = radius * out
+    return [Area(middle[0] + steps, middle[1] - heights, middle[1] + heights, colour)]

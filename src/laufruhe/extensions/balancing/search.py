@@ -1,0 +1,301 @@
+"""Fewest holes and least residual unbalance of a plane, with proof: branch and bound over sets of places (U8, U9)."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import TypeAlias
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from laufruhe.extensions.balancing.physics import Design, Plane
+from laufruhe.numerics.arrays import Array, ComplexArray, Indices, Mask
+from laufruhe.numerics.budget import is_time_over
+from laufruhe.numerics.witness import check_bound, collected
+from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoundedParts, BranchAndBound, FathomedPart, OpenNode
+from laufruhe.prove.witness import Witness
+
+Places: TypeAlias = tuple[int, ...]
+DIRECTIONS = np.exp(2j * math.pi * np.arange(64) / 64)
+"""Directions along which the reach of a set of places is measured."""
+ROUNDING = 1e-13
+"""Rounding error of a residual, relative to the sum of all changes."""
+MAX_SWEEPS = 20
+
+
+@dataclass(frozen=True)
+class Count:
+    """Least residual of a plane with one number of holes.
+
+    Attributes
+    ----------
+    design
+        Holes of the best design; None if no places take so many.
+    value, bound
+        Residual of the design, and lower bound of all designs with so many holes [kg m].
+    proven
+        True if the bound is within the gap of the value.
+    """
+
+    design: Design | None
+    value: float
+    bound: float
+    proven: bool
+
+
+@dataclass(frozen=True)
+class PlaneResult:
+    """Holes of a plane.
+
+    Attributes
+    ----------
+    plane
+        The plane.
+    counts
+        Least residuals with 0, 1, 2 ... holes.
+    best
+        Index in `counts` of the selected design.
+    complete
+        True if no time limit ended the search.
+    """
+
+    plane: Plane
+    counts: tuple[Count, ...]
+    best: int
+    complete: bool
+
+    @property
+    def design(self) -> Design:
+        """Holes of the selected design."""
+        return self.counts[self.best].design or ()
+
+    @property
+    def residual(self) -> complex:
+        """Unbalance after correction [kg m]."""
+        return self.plane.residual(self.design)
+
+    @property
+    def is_met(self) -> bool:
+        """True if the residual is permitted."""
+        return self.plane.permitted is None or abs(self.residual) <= self.plane.permitted
+
+    @property
+    def is_fewest(self) -> bool:
+        """True if fewer holes are proven to leave too much; if the residual is not met, any number of holes."""
+        if self.plane.permitted is None or not (self.is_met or self.complete):
+            return False
+        others = self.counts[: self.best] if self.is_met else self.counts
+        return all(count.bound > self.plane.permitted for count in others)
+
+    @property
+    def is_least(self) -> bool:
+        """True if no design of the numbers of holes in `counts` is better than the selected one by the gap."""
+        return all(count.proven or count.bound >= self.counts[self.best].value for count in self.counts)
+
+
+def correct(plane: Plane, max_holes: int, is_fewest: bool, gap: float) -> PlaneResult:
+    """Return the fewest holes that leave a permitted residual, or the least residual of at most `max_holes` holes.
+
+    Of all designs with the fewest holes the one with the least residual is selected.
+
+    Parameters
+    ----------
+    plane
+        Plane with places and holes.
+    max_holes
+        Largest number of holes.
+    is_fewest
+        True to stop at the first number of holes whose residual is permitted.
+    gap
+        Difference of two residuals that counts as none [kg m].
+    """
+    counts, permitted, is_over = list[Count](), plane.permitted, False
+    for holes in range(min(max_holes, len(plane.angles)) + 1):
+        count = least_residual(plane, holes, gap, counts[-1].design if counts else ())
+        if permitted is not None and count.proven and count.bound <= permitted < count.value:
+            # the gap decides nothing between too much and enough
+            count = least_residual(plane, holes, 0.0, count.design)
+        counts.append(count)
+        is_met = permitted is not None and count.value <= permitted
+        if (is_fewest and is_met) or count.value <= gap:
+            break
+        if is_over := is_time_over():
+            break
+    values = [count.value for count in counts]
+    met = [k for k, value in enumerate(values) if is_fewest and permitted is not None and value <= permitted]
+    # fewer holes are preferred to a residual that is better by less than the gap
+    best = (met or [k for k, value in enumerate(values) if value <= min(values) + gap])[0]
+    return PlaneResult(plane, tuple(counts), best, not is_over)
+
+
+def least_residual(plane: Plane, holes: int, gap: float, start: Design | None = ()) -> Count:
+    """Return the least residual of exactly so many holes, from a design with one hole less."""
+    proposal = propose(plane, holes, start)
+    value = math.inf if proposal is None else abs(plane.residual(proposal))
+    witness = None if proposal is None else Witness(np.array([place for place, _ in proposal]), value)
+    search = PlaceSets(plane, holes, gap, proposal, witness)
+    with collected() as contradictions:
+        bound = search.divide((0.0, None), sys.maxsize)
+        check_bound("holes", bound, search.value)
+    if contradictions:
+        bound = 0.0
+    # without any design both are infinite
+    is_proven = search.complete and not search.value - bound > max(gap, 2.0 * search.rounding)
+    return Count(search.design, search.value, bound, is_proven)
+
+
+def propose(plane: Plane, holes: int, start: Design | None = ()) -> Design | None:
+    """Return a good design with so many holes, by exchanges of single holes; None if none was found."""
+    if start is None or len(start) > holes:
+        return None
+    design = start
+    while len(design) < holes:
+        if (longer := _with_best_hole(plane, design)) is None:
+            return None
+        design = longer
+    for _ in range(MAX_SWEEPS):
+        before = design
+        for entry in before:
+            exchanged = _with_best_hole(plane, tuple(other for other in design if other != entry))
+            if exchanged is not None and abs(plane.residual(exchanged)) < abs(plane.residual(design)):
+                design = exchanged
+        if design == before:
+            break
+    return design
+
+
+def _with_best_hole(plane: Plane, design: Design) -> Design | None:
+    residual, best = plane.residual(design), (math.inf, (-1, -1))
+    occupied = [place for place, _ in design]
+    for place in set(range(len(plane.angles))) - set(occupied):
+        sizes = np.abs(residual + plane.changes[place])
+        for other, hole in design:
+            sizes[plane.clashes(place, other)[:, hole]] = math.inf
+        best = min(best, (float(sizes.min()), (place, int(sizes.argmin()))))
+    return None if best[0] == math.inf else tuple(sorted((*design, best[1])))
+
+
+class PlaceSets(BranchAndBound[Places | None]):
+    """Search over sets of places with one hole each; the root, None, has all sets of one size (U8).
+
+    Attributes
+    ----------
+    design
+        Best design so far.
+    rounding
+        Rounding error of a residual [kg m].
+    """
+
+    what = "sets of places"
+    reports_bounds = False
+
+    def __init__(self, plane: Plane, holes: int, gap: float, design: Design | None, witness: Witness | None) -> None:
+        self._plane, self._holes, self._gap, self.design, self.witness = plane, holes, gap, design, witness
+        self.value = math.inf if design is None else abs(plane.residual(design))
+        self.rounding = ROUNDING * (abs(plane.initial) + sum(float(np.abs(c).max()) for c in plane.changes))
+
+    @property
+    def cutoff(self) -> float:
+        """Level [kg m] from which a set is not divided."""
+        return self.value - GAP_SAFETY * self._gap
+
+    def contains_witness(self, part: Places | None) -> bool:
+        """Return True if the witness has its holes at these places."""
+        return part is None or (self.witness is not None and tuple(self.witness.place.tolist()) == part)
+
+    def is_fathomed(self, node: OpenNode[Places | None]) -> bool:
+        """Return True if no design of the set is better than the best one by more than the gap."""
+        return not node.bound < self.cutoff
+
+    def branch(self, nodes: Sequence[OpenNode[Places | None]]) -> BoundedParts[Places | None]:
+        """Yield all sets with their bounds, or the least residual of one set as its level."""
+        for node in nodes:
+            if node.part is None:
+                yield from self._bounded_sets()
+            else:
+                yield FathomedPart(max(self._least_of(node.part), node.bound))
+
+    def _bounded_sets(self) -> Iterator[tuple[float, Places]]:
+        sets = [*combinations(range(len(self._plane.angles)), self._holes)]
+        residual = self._plane.initial if self.design is None else self._plane.residual(self.design)
+        directions = np.append(DIRECTIONS, residual / (abs(residual) or 1.0))
+        bounds = set_bounds(self._plane, np.array(sets, dtype=np.intp).reshape(len(sets), self._holes), directions)
+        yield from zip(np.maximum(bounds - self.rounding, 0.0).tolist(), sets, strict=True)
+
+    def _least_of(self, places: Places) -> float:
+        """Enumerate the holes of a set of places by halves, and return the least residual below the cutoff (U9)."""
+        plane, half, level = self._plane, len(places) // 2, self.cutoff
+        left, right = _choices(plane, places[:half]), _choices(plane, places[half:])
+        sums = [_sums(plane, ends, rows) for ends, rows in ((places[:half], left), (places[half:], right))]
+        for rows, others in _compatible(plane, places, left, right):
+            if not rows.any() or not others.any():
+                continue
+            tree = cKDTree(_points(sums[1][others]))
+            targets = -(plane.initial + sums[0][rows])
+            answer = tree.query(_points(targets), distance_upper_bound=max(level, 0.0))
+            distances, nearest = np.asarray(answer[0], dtype=float), np.asarray(answer[1], dtype=np.intp)
+            k = int(np.argmin(distances))
+            if distances[k] < level:
+                level = float(distances[k])
+                chosen = (*left[rows][k].tolist(), *right[others][nearest[k]].tolist())
+                self.design = tuple(zip(places, chosen, strict=True))
+                self.value = abs(plane.residual(self.design))
+        return level - self.rounding
+
+
+def set_bounds(plane: Plane, sets: Indices, directions: ComplexArray = DIRECTIONS) -> Array:
+    """Return lower bounds of the residual with one hole at each place of every set [kg m], shape (sets,) (U8).
+
+    Any directions of unit length give a valid bound.
+    """
+    towards = np.conj(directions)[:, None]
+    hulls = np.array([(towards * changes).real.min(axis=1) for changes in plane.changes])
+    along = (towards[:, 0] * plane.initial).real
+    bounds: Array = (along + hulls[sets].sum(axis=1)).max(axis=1)
+    return bounds
+
+
+def _choices(plane: Plane, places: Places) -> Indices:
+    # holes of all places without clashes, shape (choices, places)
+    rows = np.zeros((1, 0), dtype=np.intp)
+    for k, place in enumerate(places):
+        count = len(plane.holes[place])
+        rows = np.column_stack([np.repeat(rows, count, axis=0), np.tile(np.arange(count), len(rows))])
+        for j in range(k):
+            rows = rows[~plane.clashes(places[j], place)[rows[:, j], rows[:, k]]]
+    return rows
+
+
+def _sums(plane: Plane, places: Places, rows: Indices) -> ComplexArray:
+    total = np.zeros(len(rows), dtype=complex)
+    for k, place in enumerate(places):
+        total += plane.changes[place][rows[:, k]]
+    return total
+
+
+def _points(values: ComplexArray) -> Array:
+    return np.column_stack([values.real, values.imag])
+
+
+def _compatible(plane: Plane, places: Places, left: Indices, right: Indices) -> Iterator[tuple[Mask, Mask]]:
+    """Yield classes of rows of the left half with the rows of the right half that clash with none of them."""
+    half = left.shape[1]
+    pairs = [
+        (i, j, clash)
+        for i, j in product(range(half), range(right.shape[1]))
+        if (clash := plane.clashes(places[i], places[half + j])).any()
+    ]
+    if not pairs:
+        yield np.ones(len(left), dtype=bool), np.ones(len(right), dtype=bool)
+        return
+    marks = np.concatenate([clash[left[:, i]] for i, _, clash in pairs], axis=1)
+    for mark in np.unique(marks, axis=0):
+        allowed, start = np.ones(len(right), dtype=bool), 0
+        for _, j, clash in pairs:
+            allowed &= ~mark[start : start + clash.shape[1]][right[:, j]]
+            start += clash.shape[1]
+        yield (marks == mark).all(axis=1), allowed
