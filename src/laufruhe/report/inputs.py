@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from laufruhe.errors import counted
 from laufruhe.files.numbering import USUAL
-from laufruhe.machine import Engine, SliderCrank
+from laufruhe.machine import Engine, Rotor, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.present.numbers import DASH, DEGREE, trimmed
 from laufruhe.present.tables import Table
@@ -16,16 +17,20 @@ from laufruhe.problem.problem import Problem
 
 HEAD = (
     "", "x [mm]", "bank [deg]", "throw [deg]", "fires at [deg]", "bore [mm]", "stroke [mm]", "rod [mm]", "offset [mm]",
-    "reciprocating mass [kg]", "rotating mass [kg]",
+    "reciprocating mass [kg]",
 )  # fmt: skip
+ROTORS = ("", "shaft", "ratio", "x [mm]", "y [mm]", "z [mm]", "unbalance [g mm]", "angle [deg]")
 NOTE = "Throws at a crank angle of 0, the firing dead centre of cylinder 1 (C5). The offset is that of the pin's path."
+OF_ROTORS = "The unbalance of a throw is its rotating mass times the crank radius. Angles at a crank angle of 0 (C4)."
 
 
 def input_tables(problem: Problem, engine: Engine) -> list[Table]:
-    """Return tables of the engine of a result: what it is, and the numbers of every cylinder."""
+    """Return tables of the engine of a result: what it is, and the numbers of its cylinders and rotating parts."""
     rows = list(_engine_rows(problem, engine))
     cylinders = [_cylinder(part) for part in engine.slider_cranks]
-    return [Table(("input", "value"), rows, left=2), Table(HEAD, cylinders, note=NOTE)]
+    rotors = [_rotor(rotor) for rotor in (*engine.pins, *engine.rotors)]
+    tables = [Table(("input", "value"), rows, left=2), Table(HEAD, cylinders, note=NOTE)]
+    return [*tables, *([Table(ROTORS, rotors, left=2, note=OF_ROTORS)] if rotors else [])]
 
 
 def _engine_rows(problem: Problem, engine: Engine) -> Iterator[tuple[str, str]]:
@@ -58,5 +63,12 @@ def _cylinder(part: SliderCrank) -> tuple[str, ...]:
     return (
         part.name, trimmed(1e3 * part.x), *(trimmed(DEGREE * angle) for angle in angles),
         *(DASH if length is None or math.isinf(length) else trimmed(1e3 * length, 5) for length in lengths),
-        trimmed(part.reciprocating_mass), trimmed(part.rotating_mass),
+        trimmed(part.reciprocating_mass),
     )  # fmt: skip
+
+
+def _rotor(rotor: Rotor) -> tuple[str, ...]:
+    size, angle = abs(rotor.unbalance), cmath.phase(rotor.unbalance)
+    place = (trimmed(1e3 * length) for length in (rotor.x, rotor.shaft.y, rotor.shaft.z))
+    turn = trimmed(DEGREE * (angle % math.tau)) if size else DASH
+    return rotor.name, rotor.shaft.name, trimmed(rotor.shaft.ratio), *place, trimmed(1e6 * size, 5), turn
