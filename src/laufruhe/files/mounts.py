@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from laufruhe.files import fields as f
+from laufruhe.files.axes import Axes, AxesTable, axes_of
 from laufruhe.files.complaints import Refused, errors_at_key, nearest, refuse_keys, require_distinct, si_value
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Open, Table
@@ -56,6 +57,7 @@ class BlockTable(Table):
     mass: f.PositiveMass = f.required("Mass of everything that the mounts carry, moving parts included.")
     centre_of_gravity: f.Three[f.Length] = Field(default=[0.0, 0.0, 0.0])
     inertia: f.Three[f.Inertia] = f.required("Moments of inertia about x, y and z through the centre of gravity.")
+    axes: AxesTable | None = f.optional("Axes of centre_of_gravity and inertia, if not the engine's own.")
     inertia_products: f.Three[f.Inertia] = f.optional(
         "Products of inertia xy, xz, yz of the tensor: xy = - integral of x y dm.", [0.0, 0.0, 0.0]
     )
@@ -126,6 +128,7 @@ class MountsTable(Table):
     """Mounts of the engine."""
 
     kind: Literal["rigid", "elastic"] = "rigid"
+    axes: AxesTable | None = f.optional("Axes of all positions, stiffnesses and turns, if not the engine's own.")
     positions: list[f.Three[f.Length]] = Field(default_factory=list)
     names: list[Name] | None = None
     relative_stiffness: f.Three[f.NonNegative] = f.optional(
@@ -165,25 +168,40 @@ class MountsInput:
     decisions: tuple[Decision, ...] = ()
 
 
-def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsInput:
+def mounts_of(
+    table: MountsTable | None, block: BlockTable | None, folder: Path, is_mirrored: bool = False
+) -> MountsInput:
     """Return the mounts of a file: rigid ones, or elastic ones with the block on them.
 
-    `folder` contains the problem file and its CSV files.
+    `folder` contains the problem file and its CSV files. With `is_mirrored`, y of the engine points to the right.
     """
+    axes = axes_of(table.axes if table else None, "mounts.axes", is_mirrored)
     if table is None or table.kind == "rigid":
         if block is not None:
             raise Refused(
                 "block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or remove [block]'
             )
-        return MountsInput(_rigid(table)) if table else MountsInput()
+        return MountsInput(_rigid(table, axes)) if table else MountsInput()
     if block is None:
         rule = "is missing, but elastic mounts need the mass and inertia of the block"
         raise Refused("block", None, rule, "add [block] with mass and inertia")
     (a, b, c), (xy, xz, yz) = block.inertia, block.inertia_products
-    x, y, z = block.centre_of_gravity
+    of_block = axes_of(block.axes, "block.axes", is_mirrored)
+    rows = of_block.tensor(np.array([[a, xy, xz], [xy, b, yz], [xz, yz, c]])).tolist()
+    x, y, z = of_block.place(block.centre_of_gravity)
     with errors_at_key("block"):
-        body = Block(block.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z), block.turning_inertia)
-    return _elastic(table, body, folder)
+        body = Block(block.mass, (tuple(rows[0]), tuple(rows[1]), tuple(rows[2])), (x, y, z), block.turning_inertia)
+    return _elastic(table, body, folder, axes)
+
+
+def axes_sentences(table: MountsTable | None, block: BlockTable | None) -> tuple[str, ...]:
+    """Return the sentence of a report about mounts or a block in axes of the file; empty without them."""
+    names = [name for name, part in (("mounts", table), ("block", block)) if part is not None and part.axes is not None]
+    text = (
+        f"The file gives {' and '.join(names)} in axes of its own. Results are in the engine's axes: x along the crank "
+        "to the front, y to the left, z up (C2); open positions keep the axes of the file."
+    )
+    return (text,) if names else ()
 
 
 def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
@@ -198,7 +216,7 @@ def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
     return places, list(names)
 
 
-def _rigid(table: MountsTable) -> tuple[Mount, ...]:
+def _rigid(table: MountsTable, axes: Axes) -> tuple[Mount, ...]:
     refuse_keys(table, ("stiffness", "loss_factor", "damping_per_stiffness", "stop"), "mounts", *_NOT_RIGID)
     places, names = _places(table)
     mounts = []
@@ -214,10 +232,14 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
                 "is a stiffness of zero in every direction",
                 "give at least one direction a value above zero, such as 1",
             )
-        numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
-        for key in ("position", "turned"):
-            values = _values(table, place, key, where, "add it, or mirror_of")
-            numbers += [Open.from_value(value).start for value in values]
+        position, turned = (
+            [Open.from_value(value).start for value in _values(table, place, key, where, "add it, or mirror_of")]
+            for key in ("position", "turned")
+        )
+        # the usual stiffness is that across the crank
+        is_usual = place.relative_stiffness is None and "relative_stiffness" not in table.model_fields_set
+        turned = turned if is_usual and place.turned is None else axes.turned(turned)
+        numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0, *axes.place(position), *turned]
         mounts.append(mount_from_numbers(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
     require_distinct([m.position for m in mounts], "mounts.positions", "mounts stand in one place", "move one")
     return tuple(mounts)
@@ -232,7 +254,7 @@ def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy:
     return [value] if len(_FIELDS[key][1]) == 1 else value or [0.0, 0.0, 0.0]
 
 
-def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
+def _elastic(table: MountsTable, block: Block, folder: Path, axes: Axes) -> MountsInput:
     refuse_keys(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
     places, names = _places(table)
     numbers, joins, laws = _Numbers([], []), list[int](), list[tuple[Dynamic, ...]]()
@@ -254,7 +276,8 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
             numbers.follow(joined, [_AT], mirrored=False)
         for key in _FIELDS:
             if key not in followed and (key != _AT or joined == k):
-                numbers.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
+                values = _values(table, place, key, where, "add it, or like, or mirror_of")
+                numbers.take(name, key, values, axes, where)
     springs = [mount_from_numbers(spring, row) for spring, row in zip(springs, numbers.rows, strict=True)]
     mounts = tuple(
         replace(springs[k], joined=tuple(springs[j] for j in range(k + 1, len(joins)) if joins[j] == k))
@@ -355,13 +378,32 @@ class _Numbers:
     rows: list[list[float]]
     decisions: list[Decision]
 
-    def take(self, name: str, key: str, values: Sequence[float | Open]) -> None:
+    def take(self, name: str, key: str, values: Sequence[float | Open], axes: Axes, where: str) -> None:
         """Set the numbers of one key for the last mount, and add decisions for open values."""
         unit, numbers = _FIELDS[key]
-        for number, axis, value in zip(numbers, _AXES, map(Open.from_value, values), strict=False):
-            self.rows[-1][number] = value.start
+        numbers_of_file = list(map(Open.from_value, values))
+        starts, gains = [value.start for value in numbers_of_file], np.eye(len(numbers))
+        if key == _AT:
+            starts, gains = axes.place(starts), axes.rows
+        elif key == "turned":
+            is_fixed = not any(value.is_open for value in numbers_of_file)
+            if not is_fixed and not axes.are_own:
+                rule, remedy = (
+                    "may not be open in axes of a vehicle",
+                    "remove mounts.axes, and give the engine's own axes",
+                )
+                raise Refused(f"{where}.{key}", None, rule, remedy)
+            starts = axes.turned(starts) if is_fixed and not axes.are_own else starts
+        for number, start in zip(numbers, starts, strict=True):
+            self.rows[-1][number] = start
+        for axis, gain, value in zip(_AXES, gains.T, numbers_of_file, strict=False):
             label = f"{name}.{key}" if len(numbers) == 1 else f"{name}.{key}.{axis}"
-            self.decisions += value.decisions(label, unit, MountDrive(len(self.rows) - 1, number, 1.0))
+            moved = np.flatnonzero(gain)
+            if value.is_open and len(moved) != 1:
+                rule = f"is open along {axis} of the file, which is inclined to the axes of the engine"
+                raise Refused(f"{where}.{key}", None, rule, "give mounts.axes along the engine, or fix the position")
+            drives = (MountDrive(len(self.rows) - 1, numbers[i], float(gain[i])) for i in moved)
+            self.decisions += value.decisions(label, unit, *drives)
 
     def sort(self, order: Sequence[int]) -> None:
         """Reorder the rows and the drives of decisions, so that springs of one place are neighbours."""

@@ -29,9 +29,9 @@ from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
 from laufruhe.files.load_torque import load_torque_of
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
-from laufruhe.files.mounts import load_cases_of, mounts_of
+from laufruhe.files.mounts import axes_sentences, load_cases_of, mounts_of
 from laufruhe.files.nested import at, number_at, plain, walk, with_value_at
-from laufruhe.files.numbering import sense_of
+from laufruhe.files.numbering import REVERSED, sense_of
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, open_phasing
 from laufruhe.files.problem_file import EXTENSION_KEYS, WEIGHT_KEYS, ExtensionContext, Note, ProblemFile, file_model
@@ -276,7 +276,8 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
-    on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
+    is_mirrored = table.value_of("rotation") == REVERSED
+    on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent, is_mirrored), cycle_of(table)
     wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(
@@ -297,7 +298,13 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         points=points,
         decisions=(*loads, *on_mounts.decisions, *wheel_decisions),
         source=file.source,
-        assumptions=(*file.assumptions, *sense_of(table), *(brake.said if brake else ()), *load_said),
+        assumptions=(
+            *file.assumptions,
+            *sense_of(table),
+            *axes_sentences(file.mounts, file.block),
+            *(brake.said if brake else ()),
+            *load_said,
+        ),
         tolerance=file.tolerance,
         mount_numbers=on_mounts.numbers,
         search=Search(**file.search.model_dump()),

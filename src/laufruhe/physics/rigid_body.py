@@ -6,6 +6,7 @@ and for symbols.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Shaft
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import Maths
 
 
@@ -47,6 +49,15 @@ def turned_axes(lib: Maths, angles: Sequence[Any]) -> Any:
             [cz * sy * cx + sz * sx, sz * sy * cx - cz * sx, cy * cx],
         ]
     )
+
+
+def turns_of(axes: Array) -> tuple[float, float, float]:
+    """Return the turns about x, then y, then z that give these axes as rows [rad]: the inverse of `turned_axes`."""
+    about_x = math.atan2(axes[1, 2], axes[2, 2])
+    # the second axis with the turn about x undone lies in the plane of x and y
+    second = math.cos(about_x) * axes[1] - math.sin(about_x) * axes[2]
+    about_y = math.atan2(-axes[0, 2], math.hypot(axes[0, 0], axes[0, 1]))
+    return about_x, about_y, math.atan2(-second[0], second[1])
 
 
 def along_axes(lib: Maths, axes: Any, values: Sequence[Any]) -> Any:

@@ -278,10 +278,10 @@ class EngineParts(Parts):
         return self._with("friction", "friction", keys_of(locals()))
 
     def mounts(
-        self, *, kind: Literal["rigid", "elastic"] | None = None, positions: Sequence[Values] | Array | None = None,
-        names: Sequence[str] | None = None, relative_stiffness: Values | None = None, stiffness: Values | None = None,
-        loss_factor: Value | None = None, damping_per_stiffness: Value | None = None, stop: Table | None = None,
-        places: Sequence[Table] | None = None,
+        self, *, kind: Literal["rigid", "elastic"] | None = None, axes: Table | None = None,
+        positions: Sequence[Values] | Array | None = None, names: Sequence[str] | None = None,
+        relative_stiffness: Values | None = None, stiffness: Values | None = None, loss_factor: Value | None = None,
+        damping_per_stiffness: Value | None = None, stop: Table | None = None, places: Sequence[Table] | None = None,
     ) -> Self:
         """Return the engine with mounts.
 
@@ -291,6 +291,8 @@ class EngineParts(Parts):
         ----------
         kind
             Whether the mounts give way: rigid far above their resonances, or elastic.
+        axes
+            Axes of all positions, stiffnesses and turns, if not the engine's own.
         positions
             Where the mounts are: x forward, y to the left, z up, for each [m].
         names
@@ -311,7 +313,7 @@ class EngineParts(Parts):
         return self._with("mounts", "mounts", keys_of(locals()))
 
     def block(
-        self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None,
+        self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None, axes: Table | None = None,
         inertia_products: Values | None = None, turning_inertia: Value | None = None,
     ) -> Self:
         """Return the engine with block.
@@ -326,6 +328,8 @@ class EngineParts(Parts):
             Moments of inertia about x, y and z through the centre of gravity [kg m^2].
         centre_of_gravity
             Centre of gravity of everything that the mounts carry: x forward, y to the left, z up [m].
+        axes
+            Axes of centre_of_gravity and inertia, if not the engine's own.
         inertia_products
             Products of inertia xy, xz, yz of the tensor: xy = - integral of x y dm [kg m^2].
         turning_inertia

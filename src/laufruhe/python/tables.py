@@ -65,6 +65,26 @@ def arms(
     return keys_of(locals())
 
 
+def axes(
+    *, crank: Values | Literal["+x", "-x", "+y", "-y", "+z", "-z"],
+    up: Values | Literal["+x", "-x", "+y", "-y", "+z", "-z"], origin: Values | None = None,
+) -> Table:
+    """Return a table `axes`.
+
+    Axes of a file that are not those of the engine: where the engine points in them, and where it stands.
+
+    Parameters
+    ----------
+    crank
+        Direction of the crank from the flywheel to the front, as an axis or a vector.
+    up
+        Direction of the engine's z axis, as an axis or a vector.
+    origin
+        Position of the engine's origin: on the crank, midway between the first and the last cylinder [m].
+    """
+    return keys_of(locals())
+
+
 def big_end(
     *, diameter: Value, width: Value,
 ) -> Table:

@@ -7,13 +7,18 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from laufruhe.errors import counted
 from laufruhe.files.numbering import USUAL
-from laufruhe.machine import Engine, Rotor, SliderCrank
+from laufruhe.machine import Engine, Mount, Rotor, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS
-from laufruhe.present.numbers import DASH, DEGREE, trimmed
+from laufruhe.machine.mount import every_spring
+from laufruhe.physics.rigid_body import turns_of
+from laufruhe.present.numbers import DASH, DEGREE, fixed, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.problem.problem import Problem
+from laufruhe.units import readable
 
 HEAD = (
     "", "x [mm]", "bank [deg]", "throw [deg]", "fires at [deg]", "bore [mm]", "stroke [mm]", "rod [mm]", "offset [mm]",
@@ -21,6 +26,8 @@ HEAD = (
 )  # fmt: skip
 ROTORS = ("", "shaft", "ratio", "x [mm]", "y [mm]", "z [mm]", "unbalance [g mm]", "angle [deg]")
 NOTE = "Throws at a crank angle of 0, the firing dead centre of cylinder 1 (C5). The offset is that of the pin's path."
+MOUNTS = ("mount", "x [mm]", "y [mm]", "z [mm]", "stiffness along its axes", "its axes turned [deg]")
+OF_MOUNTS = "Positions in the axes of the engine (C2). Axes are turned about x, then y, then z (E2)."
 OF_ROTORS = "The unbalance of a throw is its rotating mass times the crank radius. Angles at a crank angle of 0 (C4)."
 
 
@@ -30,7 +37,9 @@ def input_tables(problem: Problem, engine: Engine) -> list[Table]:
     cylinders = [_cylinder(part) for part in engine.slider_cranks]
     rotors = [_rotor(rotor) for rotor in (*engine.pins, *engine.rotors)]
     tables = [Table(("input", "value"), rows, left=2), Table(HEAD, cylinders, note=NOTE)]
-    return [*tables, *([Table(ROTORS, rotors, left=2, note=OF_ROTORS)] if rotors else [])]
+    tables += [Table(ROTORS, rotors, left=2, note=OF_ROTORS)] if rotors else []
+    springs = [_mount(mount, engine.block is None) for _, mount in every_spring(engine.mounts)]
+    return [*tables, *([Table(MOUNTS, springs, note=OF_MOUNTS)] if springs else [])]
 
 
 def _engine_rows(problem: Problem, engine: Engine) -> Iterator[tuple[str, str]]:
@@ -72,3 +81,11 @@ def _rotor(rotor: Rotor) -> tuple[str, ...]:
     place = (trimmed(1e3 * length) for length in (rotor.x, rotor.shaft.y, rotor.shaft.z))
     turn = trimmed(DEGREE * (angle % math.tau)) if size else DASH
     return rotor.name, rotor.shaft.name, trimmed(rotor.shaft.ratio), *place, trimmed(1e6 * size, 5), turn
+
+
+def _mount(mount: Mount, is_rigid: bool) -> tuple[str, ...]:
+    place = (trimmed(1e3 * length) for length in mount.position)
+    name, factor = ("", 1.0) if is_rigid else readable("N/m")
+    stiffness = ", ".join(trimmed(factor * value) for value in mount.stiffness) + f" {name}".rstrip()
+    turns = ", ".join(fixed(DEGREE * angle, 2) for angle in turns_of(np.array(mount.orientation)))
+    return mount.name, *place, stiffness, turns
