@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import laufruhe
 from laufruhe.errors import InputError
@@ -66,3 +67,46 @@ def test_pictures_report_and_file(result: laufruhe.Result, tmp_path: Path) -> No
     assert (tmp_path / "polar.svg").exists()
     result.save(tmp_path / "result.json")
     assert laufruhe.read_result(tmp_path / "result.json")["left.unbalance"] == result["left.unbalance"]
+
+
+@pytest.mark.slow
+def test_pictures_are_drawn_on_axes_and_figures_of_the_caller(result: laufruhe.Result) -> None:
+    whole = Figure(figsize=(14.0, 6.0))
+    left, right = whole.subfigures(1, 2)
+    (axes, other) = left.subplots(1, 2)
+    result.plot.bars(ax=axes)
+    assert axes.get_title(loc="left") == "Mean and maximum mount forces"
+    assert axes.get_legend() is not None
+    assert not other.has_data()
+    for name in ("polar", "cycle", "engine"):
+        part = Figure(figsize=(9.0, 11.0)).subfigures()
+        result.plot(name, figure=part)
+        assert part.get_figure().get_size_inches() == pytest.approx((9.0, 11.0))
+        for panel in part.axes:
+            box = panel.get_tightbbox()
+            assert box is not None
+            assert part.bbox.contains(box.x0, box.y0)
+            assert part.bbox.contains(box.x1, box.y1)
+    # what is drawn to scale stays so
+    scale = [panel.transData.get_matrix() for panel in part.axes]
+    assert scale[0][0, 0] == pytest.approx(scale[0][1, 1])
+    assert abs(scale[1][0, 0]) == pytest.approx(scale[0][0, 0])
+    with pytest.raises(InputError, match="is one panel, and this picture has 4; give figure="):
+        result.plot.polar(ax=axes)
+    with pytest.raises(InputError, match="leaves no room for the panels, which need"):
+        result.plot.polar(figure=Figure(figsize=(2.0, 2.0)))
+    with pytest.raises(InputError, match="stands beside ax; give one of both"):
+        result.plot.bars(ax=axes, figure=right)
+
+
+def test_a_notebook_shows_tables(result: laufruhe.Result) -> None:
+    text = result._repr_html_()
+    assert "the proven optimum" in text
+    assert ">left.unbalance</th>" in text
+    assert ">front left</th>" in text
+    problem = laufruhe.load(NAME)._repr_html_()
+    assert "Minimise mean mount force." in problem
+    assert "<td>0 to 0.05 kg m</td>" in problem
+    assert "<td>4 kg</td>" in problem
+    named = laufruhe.load({**laufruhe.load(NAME).origin.tables, "title": "<script>"})  # type: ignore[union-attr]
+    assert "<script" not in named._repr_html_()

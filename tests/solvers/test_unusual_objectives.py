@@ -110,4 +110,4 @@ def test_a_problem_shows_itself_in_a_line(closed: Problem) -> None:
     assert repr(closed) == (
         "<Problem problem, 1 cylinder, four-stroke, 4 mounts, 1 operating point, 0 limits; open: nothing>"
     )
-    assert closed._repr_html_().startswith("<strong>test</strong><br>problem, 1 cylinder")
+    assert closed._repr_html_().startswith("<strong>test</strong>\n<div>problem, 1 cylinder")

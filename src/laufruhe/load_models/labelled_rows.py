@@ -13,6 +13,7 @@ from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.curves import labelled
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.dependence import is_affine, open_kinds
 from laufruhe.problem.measure import Measure, counted_rotors, kinks_of
@@ -115,18 +116,27 @@ def labelled_rows(model: AffineModel, measure: Measure, samples: int) -> xr.Data
     norm = model.norm(measure, samples)
     axes = row_axes(model, measure, norm, samples)
     shape, names = tuple(len(labels) for labels in axes.values()), tuple(axes)
-    unit = {"units": measure.unit or "1"}
-    columns = {"decision": column_names(model.domains)}
+    unit = measure.unit or "1"
+    decided = [d.decision.unit or "1" for d in model.domains for _ in range(d.width)]
+    columns = {
+        "decision": column_names(model.domains),
+        "decision_unit": ("decision", decided),
+        "slope_unit": ("decision", [unit if per == "1" else f"{unit} per {per}" for per in decided]),
+    }
+    slope = {"long_name": "derivative of the rows by the decision", "unit_of": "slope_unit"}
     variables = {
-        "constant": (names, norm.constant.reshape(shape), unit),
-        "slope": ((*names, "decision"), norm.slope.reshape(*shape, -1), {"long_name": "derivative of the rows"}),
-        "weight": (names[:-1], norm.grid.weights.reshape(shape[:-1])),
+        "constant": (names, norm.constant.reshape(shape), {"units": unit, "long_name": "rows at zero"}),
+        "slope": ((*names, "decision"), norm.slope.reshape(*shape, -1), slope),
+        "weight": (
+            names[:-1],
+            norm.grid.weights.reshape(shape[:-1]),
+            {"units": "1", "long_name": "weight in the mean"},
+        ),
     }
     data = xr.Dataset(variables, {**axes, **columns}, {"title": measure.name, "norm": norm.norm.name})
     if "angle" in data.coords:
         data["angle"].attrs["units"] = "deg"
-    data["decision"].attrs["units"] = ", ".join(d.decision.unit or "1" for d in model.domains for _ in range(d.width))
-    return data
+    return labelled(data)
 
 
 def row_axes(model: AffineModel, measure: Measure, norm: AffineNorm, samples: int) -> dict[str, Any]:

@@ -14,13 +14,14 @@ from typing import Any
 with chdir(Path(__file__).parent):
     import matplotlib  # noqa: F401
 
-from matplotlib.figure import Figure
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
 
-from laufruhe.errors import refused
+from laufruhe.errors import refused, wrong_call
 from laufruhe.numerics.processes import fork_map
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg as as_svg
-from laufruhe.plots.style import save, save_and_show
+from laufruhe.plots.style import drawn_on, save, save_and_show
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result
 
@@ -36,14 +37,29 @@ def names(result: Result) -> list[str]:
     return [name for name in PICTURES if import_module(PICTURES[name].module).applies(result)]
 
 
-def figure(result: Result, name: str) -> Figure:
-    """Return one picture of a result, by its name among `laufruhe.present.pictures.PICTURES`."""
+def figure(
+    result: Result, name: str, *, ax: Axes | None = None, figure: Figure | SubFigure | None = None
+) -> Figure:  # fmt: skip
+    """Return one picture of a result, by its name among `laufruhe.present.pictures.PICTURES`.
+
+    Parameters
+    ----------
+    result, name
+        Result, and name of the picture.
+    ax
+        Axes to draw on, for a picture of one panel; they get title and legend.
+    figure
+        Empty figure or subfigure to fill. By default a figure of its own.
+    """
+    if ax is not None and figure is not None:
+        raise wrong_call("figure", figure, "stands beside ax", "give one of both")
     picture = import_module(PICTURES[name].module) if name in PICTURES else None
     if picture is None or not picture.applies(result):
         known = ", ".join(names(result))
         raise refused("name", f'"{name}"', "is not the name of a picture of this result", f"one of {known}", "figure")
     prepare(_words(result))
-    drawn: Figure = picture.figure(result)
+    with drawn_on(figure if ax is None else ax):
+        drawn: Figure = picture.figure(result)
     return drawn
 
 

@@ -176,7 +176,7 @@ def views(view: EngineView) -> Page:
     scale = min((WIDE - NARROW) / sizes[1, 0], WIDE / sizes[:, 0].sum(), HIGH / sizes[:, 1].max())
     height = float(scale * sizes[:, 1].max())
     drawn = page(1, 2, (0.5 * WIDE, height), across=ACROSS)
-    inches, left = drawn.figure.get_figwidth(), 0.0
+    inches, left = drawn.size[0], 0.0
     for axes, points, size, is_side in zip(drawn.panels, (front, side), sizes, (False, True), strict=True):
         width = max(float(scale * size[0]), NARROW)
         axes.set_position((left / inches, 0.0, width / inches, 1.0))
@@ -185,7 +185,7 @@ def views(view: EngineView) -> Page:
         (x, y), half = 0.5 * (points.min(axis=0) + points.max(axis=0)), (0.5 * width / scale, 0.5 * height / scale)
         across, up = (x - half[0], x + half[0]), (y - half[1], y + half[1])
         down = is_side and view.is_flat
-        axes.set(xlim=across[::-1] if is_side else across, ylim=up[::-1] if down else up)
+        axes.set(xlim=across[::-1] if is_side else across, ylim=up[::-1] if down else up, aspect="equal")
         for axis, steps in ((axes.xaxis, width / 0.8), (axes.yaxis, height / 0.5)):
             round_ticks(axis, min(max(int(steps), 2), 7))
     return drawn

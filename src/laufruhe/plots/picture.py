@@ -60,7 +60,7 @@ def _drawn(picture: Picture) -> Figure:
         else Patch(color=colour_of(mark.colour), label=getattr(mark, "label", ""))
         for mark in marks
     ]
-    heading(drawn.figure, picture.title, picture.words, legend, picture.credit)
+    heading(drawn, picture.title, picture.words, legend, picture.credit)
     return drawn.figure
 
 

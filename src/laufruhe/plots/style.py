@@ -11,20 +11,23 @@ import io
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 from PIL import Image
 
+from laufruhe.errors import wrong_call
+from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import families
 from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, round_ticks, typeset, width_of, wrap_lines
 from laufruhe.present.measures import evaluations_with_loads, is_changed
@@ -47,6 +50,8 @@ _TITLE, _ENGINE = 13.0, 10.0
 _LINE = 1.35 / 72.0
 """Height of a line of text of one point [inch]."""
 _HANDLE, _GAP = 1.6, 1.6
+_SMALLEST = 0.5
+"""Least size of all panels together on a figure of the caller [inch]."""
 _PER_TICK = 0.6
 """Room that a number of a lying axis takes [inch]."""
 
@@ -71,12 +76,26 @@ def styled() -> Iterator[None]:
         yield
 
 
+_PLACE: ContextVar[Axes | Figure | SubFigure | None] = ContextVar("place", default=None)
+
+
+@contextmanager
+def drawn_on(place: Axes | Figure | SubFigure | None) -> Iterator[None]:
+    """Draw pictures within the block on axes or on a figure of the caller, in place of figures of their own."""
+    earlier = _PLACE.set(place)
+    try:
+        yield
+    finally:
+        _PLACE.reset(earlier)
+
+
 @dataclass(frozen=True)
 class Page:
-    """A figure and its panels, row by row."""
+    """A figure and its panels, row by row, with the size [inch] that they are laid out for."""
 
     figure: Figure
     panels: tuple[Axes, ...]
+    size: tuple[float, float]
 
 
 def page(
@@ -96,30 +115,52 @@ def page(
     across = gap if across is None else across
     width = columns * panel[0] + (columns - 1) * across
     height = rows * (panel[1] + lead) + (rows - 1) * gap
+    count = rows * columns if count is None else count
+    place = _PLACE.get()
+    if isinstance(place, Axes) and count > 1:
+        raise wrong_call("ax", place, f"is one panel, and this picture has {count}", "give figure=, or neither")
     with styled():
-        figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
-        FigureCanvasAgg(figure)
-        panels = []
-        for k in range(rows * columns if count is None else count):
+        if isinstance(place, Axes):
+            figure, panels = cast(Figure, place.figure), [place]
+        elif place is not None:
+            figure, panels = cast(Figure, place), []
+        else:
+            figure, panels = Figure(figsize=(width, height), dpi=DPI, facecolor="white"), []
+            FigureCanvasAgg(figure)
+        for k in range(len(panels), count):
             row, column = divmod(k, columns)
             left, bottom = column * (panel[0] + across), (rows - 1 - row) * (panel[1] + lead + gap)
             panels.append(figure.add_axes((left / width, bottom / height, panel[0] / width, panel[1] / height)))
-            for axis in (panels[-1].xaxis, panels[-1].yaxis):
-                maximum = 6 if axis is panels[-1].yaxis else min(max(int(panel[0] / _PER_TICK), 3), 7)
-                round_ticks(axis, maximum)
-    return Page(figure, tuple(panels))
+        for axes in panels:
+            round_ticks(axes.xaxis, min(max(int(panel[0] / _PER_TICK), 3), 7))
+            round_ticks(axes.yaxis, 6)
+    return Page(figure, tuple(panels), (width, height))
 
 
-def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], source: str, engine: str = "") -> None:
-    """Add title, engine, description, legend and source; the page grows around them."""
+def heading(drawn: Page, title: str, lines: str, legend: Sequence[Artist], source: str, engine: str = "") -> None:
+    """Add title, engine, description, legend and source.
+
+    The page grows around them. On a figure of the caller the panels fill the rest. Axes of the caller get title and
+    legend only.
+    """
+    figure, place = drawn.figure, _PLACE.get()
+    # a picture removes panels that it leaves empty
+    drawn = replace(drawn, panels=tuple(axes for axes in drawn.panels if axes in figure.axes))
     with styled():
-        for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        for axis in (axis for axes in drawn.panels for axis in (axes.xaxis, axes.yaxis)):
             axis.set_label_text(typeset(axis.get_label_text()))
         for artist in legend:
             artist.set_label(typeset(str(artist.get_label())))
-        bounds = Bbox.union([box for axes in figure.axes if (box := axes.get_tightbbox()) is not None])
-        inside = bounds.transformed(figure.dpi_scale_trans.inverted())
-        width = max(inside.width + 2.0 * EDGE, NARROWEST)
+        if isinstance(place, Axes):
+            place.set_title(typeset(title), loc="left")
+            if legend:
+                place.legend(handles=list(legend))
+            return
+        page_size = _inches(figure)
+        before, after = _outside(drawn, np.zeros(2), page_size)
+        places = [axes.get_position(original=True) for axes in drawn.panels]
+        width = float((page_size + before + after)[0]) + 2.0 * EDGE
+        width = float(page_size[0]) if place is not None else max(width, NARROWEST)
         room = width - 2.0 * EDGE
         words = [(title, _TITLE, "bold", INK), (engine, _ENGINE, "normal", INK), (lines, SMALL, "normal", FAINT)]
         head = [(wrap_lines(text, room, size, weight), size, weight, ink) for text, size, weight, ink in words if text]
@@ -127,31 +168,54 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
         rows, columns = _legend_shape([str(artist.get_label()) for artist in legend], room)
         above = sum(len(text) * size * _LINE + 0.03 for text, size, _, _ in head) + rows * 1.05 * SMALL * _LINE
         below = EDGE + len(foot) * SMALL * _LINE + _ABOVE_FOOT
-        height = EDGE + above + _BELOW_HEAD + inside.height + below
-        _resize(figure, (width, height), (EDGE - inside.x0, below - inside.y0))
+        edges, margins = np.array([EDGE, below]), np.array([2.0 * EDGE, EDGE + above + _BELOW_HEAD + below])
+        if place is None:
+            height = float((page_size + before + after + margins)[1])
+            figure.set_size_inches(width, height)
+            _arrange(drawn, places, before + edges, page_size)
+        else:
+            height = float(page_size[1])
+            # texts keep their size as panels shrink: what sticks out of them is measured again
+            for _ in range(2):
+                region, corner = page_size - before - after - margins, before + edges
+                if region.min() < _SMALLEST:
+                    need = page_size + np.maximum(_SMALLEST - region, 0.0)
+                    rule = f"leaves no room for the panels, which need {need[0]:.1f} by {need[1]:.1f} inches"
+                    raise wrong_call("figure", place, rule, "give a larger figure")
+                _arrange(drawn, places, corner, region)
+                before, after = _outside(drawn, corner, region)
         top, left = height - EDGE, EDGE / width
         for text, size, weight, ink in head:
             figure.text(left, top / height, "\n".join(text), size=size, weight=weight, va="top", color=ink,
                         linespacing=1.2)  # fmt: skip
             top -= len(text) * size * _LINE + 0.03
         if legend:
-            drawn = figure.legend(
+            entries = figure.legend(
                 handles=list(legend), loc="upper left", bbox_to_anchor=(left, top / height), ncols=columns,
                 frameon=False, fontsize=SMALL, borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE,
                 columnspacing=_GAP, labelcolor=INK,
             )  # fmt: skip
-            for entry_text in drawn.get_texts():
+            for entry_text in entries.get_texts():
                 entry_text.set_text(fit_line(entry_text.get_text(), room - 2.6 * SMALL / 72.0))
         figure.text(left, EDGE / height, "\n".join(foot), size=SMALL, va="bottom", color=FAINT, linespacing=1.2)
 
 
-def _resize(figure: Figure, size: tuple[float, float], offset: tuple[float, float]) -> None:
-    old_size = figure.get_size_inches()
-    places = [axes.get_position(original=True) for axes in figure.axes]
-    figure.set_size_inches(size)
-    for axes, box in zip(figure.axes, places, strict=True):
-        corner = (np.array([box.x0, box.y0]) * old_size + offset) / size
-        axes.set_position((*corner, *(np.array([box.width, box.height]) * old_size / size)))
+def _inches(figure: Figure) -> Array:
+    return np.array(figure.bbox.size) / figure.dpi
+
+
+def _outside(drawn: Page, corner: Array, region: Array) -> tuple[Array, Array]:
+    # what is drawn left of and below the region of the panels, and right of and above it [inch]
+    bounds = Bbox.union([box for axes in drawn.panels if (box := axes.get_tightbbox()) is not None])
+    ends = (bounds.get_points() - drawn.figure.bbox.get_points()[0]) / drawn.figure.dpi
+    return corner - ends[0], ends[1] - corner - region
+
+
+def _arrange(drawn: Page, places: Sequence[Bbox], corner: Array, region: Array) -> None:
+    size = _inches(drawn.figure)
+    for axes, place in zip(drawn.panels, places, strict=True):
+        left_and_low, widths = (np.array(place.min) * region + corner) / size, np.array(place.size) * region / size
+        axes.set_position((*left_and_low, *widths))
 
 
 def finish_page(
@@ -161,7 +225,7 @@ def finish_page(
     problem = result.problem
     described = f"Source: {problem.source}. " if problem.source else ""
     source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
-    heading(drawn.figure, title, lines, legend, source, problem.title)
+    heading(drawn, title, lines, legend, source, problem.title)
     return drawn.figure
 
 

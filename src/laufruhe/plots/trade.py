@@ -80,7 +80,7 @@ def _drawn(trade: Trade) -> Figure:
     for axes, panel in zip(sheet.panels, panels, strict=True):
         _draw(axes, panel)
     heading(
-        sheet.figure, "Speed against accuracy", "Every fidelity: processor time of the calls that users make.", [],
+        sheet, "Speed against accuracy", "Every fidelity: processor time of the calls that users make.", [],
         "Line: fidelities that no other beats in both. Thin line upwards: bound that the call states. "
         "Computed with Laufruhe.", trade.problem.title,
     )  # fmt: skip

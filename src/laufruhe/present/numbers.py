@@ -55,6 +55,12 @@ def with_unit(value: float, unit: str) -> str:
     return f"{trimmed(value * factor)} {name}".rstrip()
 
 
+def between(lower: float, upper: float, unit: str) -> str:
+    """Return the bounds of a number with their unit."""
+    name, factor = readable(unit)
+    return f"{trimmed(lower * factor)} to {trimmed(upper * factor)} {name}".rstrip()
+
+
 def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
     """Return a number as `number` does, in readable units with the unit's name."""
     name, factor = readable(unit)

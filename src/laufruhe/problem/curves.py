@@ -110,7 +110,7 @@ class Fields:
         axes = {axis.name: axis for axis in (*shared, *(axis for field in self.fields for axis in field.own_axes))}
         units = {name: {"units": axis.unit} if axis.unit else {} for name, axis in axes.items()}
         coords = {name: ([name], list(axis.labels), units[name]) for name, axis in axes.items()}
-        return xr.Dataset(variables, coords, {"title": self.title})
+        return labelled(xr.Dataset(variables, coords, {"title": self.title}))
 
     def table(self) -> tuple[list[str], Iterator[list[Any]]]:
         """Return headings and rows of a table: one row for each index of the row axes, columns for each design."""
@@ -126,6 +126,19 @@ class Fields:
         leads = itertools.product(*(axis.labels for axis in self.rows))
         rows = ([*lead, *cells] for lead, *cells in zip(leads, *flat, strict=True))
         return [*heads, *(head for head, _ in columns)], rows
+
+
+def labelled(data: xr.Dataset) -> xr.Dataset:
+    """Give each variable of a dataset a long name, and each count or order the unit 1, where these are missing.
+
+    A variable that has several units names the coordinate of its units as `unit_of`.
+    """
+    words = {"angle": "crank angle", "order": "order of crank speed", "point": "operating point"}
+    for name, values in data.variables.items():
+        values.attrs.setdefault("long_name", words.get(str(name), str(name).replace("_", " ")))
+        if values.dtype.kind in "iu" or name == "order":
+            values.attrs.setdefault("units", "1")
+    return data
 
 
 def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
@@ -173,7 +186,9 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
 
 
 def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
-    """Return natural frequencies [Hz], loss factors and shares of kinetic energy of a block on elastic mounts.
+    """Return natural frequencies [Hz], loss factors, energy shares and shapes of a block on elastic mounts (E6, E7).
+
+    Shapes have a modal mass of one.
 
     Raises
     ------
@@ -185,11 +200,14 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
             "stands on no elastic mounts, so it has no natural modes; give [block] and elastic [mounts]", "mounts"
         )
     modes = [mounting_in(design.engine).modes for design in designs.values()]
-    motion = CurveAxis("motion", tuple(MOTIONS))
+    motion, direction = CurveAxis("motion", tuple(MOTIONS)), CurveAxis("direction", ("x", "y", "z"))
+    shapes = np.array([one.shapes.T for one in modes])
     fields = (
         Field("frequency", "natural frequency", "Hz", (), np.array([one.frequencies for one in modes])),
         Field("loss_factor", "loss factor", "", (), np.array([one.loss for one in modes])),
         Field("energy", "share of kinetic energy", "", (motion,), np.array([one.energy.T for one in modes])),
+        Field("shift", "shift of the centre of gravity", "kg^-1/2", (direction,), shapes[..., :3]),
+        Field("turn", "turn of the block", "kg^-1/2 m^-1", (direction,), shapes[..., 3:]),
     )
     return Fields(
         "Natural modes", CurveAxis("design", tuple(designs)), (CurveAxis("mode", tuple(range(1, 7))),), fields

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -224,9 +223,6 @@ class Problem(Goals, Statements):
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
-
-    def _repr_html_(self) -> str:
-        return f"<strong>{html.escape(self.title)}</strong><br>{html.escape(self.summary)}"
 
     @property
     def summary(self) -> str:

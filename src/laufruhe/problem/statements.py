@@ -1,4 +1,4 @@
-"""Methods of a problem that state it for other libraries: xarray, cvxpy, CasADi and scipy.
+"""Methods of a problem that state it for notebooks and for other libraries: xarray, cvxpy, CasADi and scipy.
 
 The functions are named by their address, because this room imports no solver.
 """
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FUNCTIONS = {
+    "html": "laufruhe.report.notebook:problem_html",
     "affine": "laufruhe.load_models.labelled_rows:labelled_measures",
     "objective_function": "laufruhe.load_models.objective_function:objective_function",
     "to_cvxpy": "laufruhe.solvers.cones.cvxpy_program:program_of",
@@ -28,6 +29,9 @@ class Statements:
 
     def _call(self, name: str, *arguments: Any) -> Any:
         return resolve_name(_FUNCTIONS[name])(self, *arguments)
+
+    def _repr_html_(self) -> str:
+        return str(self._call("html"))
 
     def affine(self, angles: int | None = None) -> dict[str, xr.Dataset]:
         """Return the load rows V0 + B x of every term and limit by its name [xarray].

@@ -17,23 +17,27 @@ from laufruhe.report.json_result import as_json
 from laufruhe.solvers import result as solved
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
 
 
 # matplotlib is imported for the first picture
 class Pictures:
-    """Pictures of a result: `result.plot.polar()`, or `result.plot("polar")`."""
+    """Pictures of a result: `result.plot.polar()`, or `result.plot("polar")`.
+
+    A picture of one panel can be drawn on axes of matplotlib (`ax=`), each one on a figure or subfigure (`figure=`).
+    """
 
     def __init__(self, result: solved.Result) -> None:
         self._result = result
 
-    def __call__(self, name: str) -> Figure:
-        """Return a picture by name, as a figure of matplotlib."""
+    def __call__(self, name: str, *, ax: Axes | None = None, figure: Figure | SubFigure | None = None) -> Figure:
+        """Return a picture by name, as a figure of matplotlib; see `laufruhe.plots.figure`."""
         from laufruhe import plots
 
-        return plots.figure(self._result, name)
+        return plots.figure(self._result, name, ax=ax, figure=figure)
 
-    def __getattr__(self, name: str) -> Callable[[], Figure]:
+    def __getattr__(self, name: str) -> Callable[..., Figure]:
         if name.replace("_", "-") not in PICTURES and name not in PICTURES:
             raise AttributeError(f"a result has no picture '{name}'; it has {', '.join(self)}")
         return partial(self, name if name in PICTURES else name.replace("_", "-"))
@@ -61,6 +65,11 @@ class Result(solved.Result):
     """
 
     history: tuple[Progress, ...] = ()
+
+    def _repr_html_(self) -> str:
+        from laufruhe.report.notebook import result_html
+
+        return result_html(self)
 
     @property
     def plot(self) -> Pictures:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup, escape
 
 from laufruhe.live import LiveModel, page_assets
+from laufruhe.present.tables import Table
 from laufruhe.report.document import Document
 
 if TYPE_CHECKING:
@@ -32,17 +33,24 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
             texts = {"model": live.as_json(), "style": page_assets()["live.css"], "script": page_assets()["live.js"]}
             content = {name: Markup(text) for name, text in texts.items()}
         sliders = {"heading": HEADING, **content}
-    return f"{template().render(document=document, pictures=inline, live=sliders)}\n"
+    return f"{template(PAGE).render(document=document, pictures=inline, live=sliders)}\n"
+
+
+def table_html(table: Table) -> str:
+    """Return heads and rows of a table as HTML."""
+    module: Any = template("table.html").module
+    return str(module.table(table))
 
 
 @cache
-def template() -> Template:
-    """Return the compiled Jinja template of the HTML report."""
+def template(name: str = PAGE) -> Template:
+    """Return a compiled Jinja template of the HTML report."""
     import jinja2
 
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    loader = jinja2.FunctionLoader(lambda file: (files("laufruhe.report") / file).read_text(encoding="utf-8"))
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, loader=loader)
     environment.filters["marked"] = _marked
-    return environment.from_string((files("laufruhe.report") / PAGE).read_text(encoding="utf-8"))
+    return environment.get_template(name)
 
 
 def data_address(svg: str) -> str:

@@ -20,6 +20,7 @@ from laufruhe.errors import ModelError, wrong_call
 from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices, Mask
 from laufruhe.numerics.workers import executor_for, unordered_map
+from laufruhe.problem.curves import labelled
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import evaluate
@@ -51,7 +52,7 @@ def evaluate_many(problem: Problem, designs: Any, jobs: int = 1) -> pd.DataFrame
     data = table.to_xarray().transpose(*designs.sizes).assign_coords(designs.coords)
     for name, unit in table.attrs["units"].items():
         data[name].attrs["units"] = unit or "1"
-    return data
+    return labelled(data)
 
 
 def _table(problem: Problem, designs: Any, jobs: int) -> pd.DataFrame:

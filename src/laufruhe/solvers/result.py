@@ -230,7 +230,7 @@ class Result(ResultContent):
         return orders_of(self._with_loads).dataset()
 
     def modes(self) -> xr.Dataset:
-        """Return natural frequencies, loss factors and energy shares of a block on elastic mounts [xarray].
+        """Return natural frequencies, loss factors, energy shares and shapes of a block on elastic mounts [xarray].
 
         Raises
         ------

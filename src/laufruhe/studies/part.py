@@ -130,4 +130,4 @@ class Part(Table):
 
 def variable(dims: str | tuple[str, ...], values: Any, words: str, unit: str = "1") -> tuple[Any, Any, dict[str, str]]:
     """Return values along dimensions with unit and long name, as xarray takes them."""
-    return dims, values, {"units": unit, "long_name": words}
+    return dims, values, {"units": unit or "1", "long_name": words}

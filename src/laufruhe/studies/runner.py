@@ -20,6 +20,7 @@ from laufruhe.numerics.workers import (
     unordered_map,
     worker_count,
 )
+from laufruhe.problem.curves import labelled
 from laufruhe.studies.part import Record
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import ProblemFiles
@@ -96,7 +97,7 @@ def run(
             ]
             fingerprints_of_part = [fingerprint for fingerprint, _ in points_of]
             records = Records(fingerprints_of_part, store)
-            datasets[part.name] = part.dataset([point for _, point in points_of], records)
+            datasets[part.name] = labelled(part.dataset([point for _, point in points_of], records))
             seconds[part.name] = sum(store[key].seconds[key] for key in set(fingerprints_of_part))
     return datasets, seconds
 

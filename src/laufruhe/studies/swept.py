@@ -158,13 +158,13 @@ def dataset(
     for name in _ON_MOUNTS:
         words = f"{name.replace('_', ' ')} of the mount's force"
         variables[name] = variable(("point", "mount"), _table(name, records, mounts), words, "N")
-    decided = {"long_name": "final value, in decision_unit"}
+    decided = {"long_name": "final value, in decision_unit", "unit_of": "decision_unit"}
     variables["decided"] = (("point", "decision"), _table("decided", records, list(units)), decided)
     for name, design in by_order.items():
         words = f"amplitude by order, {design} design"
         variables[name] = variable(("point", "order"), _table(name, records, orders), words, "N")
     coords: dict[str, Any] = {
-        "mount": mounts,
+        "mount": np.array(mounts, dtype=str),
         "decision": list(units),
         "decision_unit": ("decision", list(units.values())),
         **{name: ("point", values) for name, values in along_points.items()},
@@ -172,7 +172,7 @@ def dataset(
     }
     if limit_units:
         value, price = (_table(name, records, list(limit_units)) for name in ("limit_value", "shadow_price"))
-        value_words = {"long_name": "value of the limited measure, in limit_unit"}
+        value_words = {"long_name": "value of the limited measure, in limit_unit", "unit_of": "limit_unit"}
         price_words = "decrease of the metric per unit by which the limit is relaxed, in price_unit"
         prices = [f"{unit or '1'} per {limit_unit}" if limit_unit else unit for limit_unit in limit_units.values()]
         variables["limit_value"] = (("point", "limit"), value, value_words)

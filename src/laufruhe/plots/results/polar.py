@@ -136,7 +136,7 @@ def _frame(axes: Axes, frame: Frame, factor: float, turns: int) -> None:
         return
     across, up = (size / frame.times[direction] for direction in (LATERAL, VERTICAL))
     axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
-    axes.set(xlim=(-across, across), ylim=(-up, up))
+    axes.set(xlim=(-across, across), ylim=(-up, up), aspect=across / up)
     round_ticks(axes.xaxis, 4, symmetric=True)
 
 

@@ -49,7 +49,7 @@ def figure(result: Result) -> Figure:
     has_speed, turning = facts[k].irregularity is not None, list[Series]()
     drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.3, lead=0.0)
     # room for the label above the last panel
-    box, high = drawn.panels[-1].get_position(), drawn.figure.get_figheight()
+    box, high = drawn.panels[-1].get_position(), drawn.size[1]
     drawn.panels[-1].set_position((box.x0, box.y0 - 0.5 / high, box.width, box.height))
     unit = in_thousands(largest, "N m")
     _torque(drawn.panels[0], visible, degrees, facts[k].mean, unit)

@@ -7,6 +7,7 @@ from itertools import pairwise
 from laufruhe.present.measures import is_changed, is_met, limits_of, objective_unit
 from laufruhe.present.numbers import (
     DASH,
+    between,
     figure,
     in_grams,
     number,
@@ -55,9 +56,8 @@ def decisions(result: Result) -> list[Table]:
 
 
 def _decision(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:
-    name, factor = readable(d.unit)
     maximum = max(abs(d.lower), abs(d.upper))
-    bounds = f"{trimmed(d.lower * factor)} to {trimmed(d.upper * factor)} {name}".rstrip()
+    bounds = between(d.lower, d.upper, d.unit)
     # the angle of a zero size is meaningless
     size = before if d.name.endswith(".angle") else None
     initial = DASH if size and not size.initial else with_unit(d.initial, d.unit)

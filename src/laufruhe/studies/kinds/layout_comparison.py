@@ -130,7 +130,7 @@ class LayoutComparison(SweptPart):
             return data
         values = np.array([[record["further"][name] for name in names] for record in records], dtype=float)
         why = [[record["why_none"][name] for name in names] for record in records]
-        about = {"long_name": "further quantity of the final design, in quantity_unit"}
+        about = {"long_name": "further quantity of the final design, in quantity_unit", "unit_of": "quantity_unit"}
         wheel = f"flywheel for 1/{number(1.0 / self.flywheel_for)}" if self.flywheel_for else ""
         units = ["kg m^2" if name == _MIN_FLYWHEEL else MEASURES[name][0].unit for name in names]
         dims = ("point", "quantity")

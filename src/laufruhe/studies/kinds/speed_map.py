@@ -164,7 +164,7 @@ class SpeedMapStudy(Part):
         data = data.drop_dims([name for name in ("order", "mode") if not data.sizes[name]])
         words = {"value": "value of every measure, in measure_unit", "limit": "limit of every measure, in measure_unit"}
         for name, text in words.items():
-            data[name].attrs["long_name"] = text
+            data[name].attrs.update(long_name=text, unit_of="measure_unit")
         if "amplitude" in data:
             attributes = {"long_name": "largest amplitude of every order of crank speed", "of": next(iter(units))}
             data["amplitude"].attrs.update(attributes | {"units": next(iter(units.values()))})
