@@ -137,6 +137,8 @@ def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
     return Effect(Direction.ROLL, 1.0, key, series)
 
 
+_NARROW = 1e-6
+"""Relative width of an interval at the end of a range of speeds that is not divided further."""
 FINE_SPEED = 4
 """Times as many steps as the fidelity has, at which the ends of the speed are sought."""
 
@@ -179,6 +181,43 @@ class Swing:
         except ModelError:
             return np.inf
         return float((speeds.max() - speeds.min()) / self.speed)
+
+    def speed_ranges(self, degree: float, inertia: float) -> tuple[tuple[float, float], ...]:
+        """Return the ranges of mean speed in which the degree of irregularity is at most `degree` [rad/s] (T13).
+
+        Gas and load torque are those of the operating point at every speed. The last range may end at infinity.
+        """
+        work = np.concatenate([self.work, self.bent_work])
+        total = inertia + np.concatenate([self.inertia, self.bent_inertia])
+        stored, swing = float(np.ptp(work)), float(np.ptp(total))
+        # no slower speed keeps the limit (T11)
+        slowest = degree * (2.0 + degree) * (0.5 * float(total.max()) + 0.25 * swing) + 0.5 * swing
+        last = slowest / stored if stored > 0.0 else 1.0
+        # intervals of the inverse square of the speed, on which the energy is bounded
+        within, intervals = list[tuple[float, float]](), [(0.0, last)]
+        while intervals:
+            low, high = intervals.pop()
+            try:
+                middle = 0.5 * (low + high)
+                energy = start_energy(middle * self.work, inertia + self.inertia, 1.0) + middle * work
+            except ModelError:
+                continue
+            change = 0.5 * (high - low) * stored
+            above, under = (2.0 * np.maximum(energy + side, 0.0) / total for side in (change, -change))
+            if math.sqrt(above.max()) - math.sqrt(under.min()) <= degree:
+                within.append((low, high))
+                continue
+            is_wide = high - low > _NARROW * (high + _NARROW * last)
+            if is_wide and math.sqrt(under.max()) - math.sqrt(above.min()) <= degree:
+                intervals += [(low, middle), (middle, high)]
+        ranges = list[tuple[float, float]]()
+        for low, high in sorted(within, reverse=True):
+            first = 1.0 / math.sqrt(high) if stored > 0.0 else 0.0
+            end = 1.0 / math.sqrt(low) if low > 0.0 else math.inf
+            if ranges and first == ranges[-1][1]:
+                first = ranges.pop()[0]
+            ranges.append((first, end))
+        return tuple(ranges)
 
     def minimum_inertia(self, degree: float) -> float:
         """Return the least inertia without pistons and rods for a degree of irregularity [kg m2] (T3).

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from itertools import starmap
+
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_forces import CycleMeasures
-from laufruhe.physics.torque import TorqueFacts, torque_facts
+from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, turning_inertia
 from laufruhe.present.gas_figures import HEAD, gas_note, gas_rows
 from laufruhe.present.measures import (
     Places,
@@ -21,8 +24,9 @@ from laufruhe.present.measures import (
     shaking_orders,
     uses_torque,
 )
-from laufruhe.present.numbers import DASH, aligned, number, percent
+from laufruhe.present.numbers import DASH, RPM, aligned, number, percent
 from laufruhe.present.tables import Table
+from laufruhe.problem.channels import IRREGULARITY
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
@@ -33,6 +37,9 @@ MAX_ORDERS, SHARE = 8, 0.005
 TORQUE = (
     "Torque of gas, pistons and rods, without friction. Stored: energy that the flywheel must store. "
     "Irregularity: largest less smallest speed over the mean."
+)
+EVEN = (
+    "Speeds at which this flywheel keeps the limit with the same torque of gas and load; the ranges are proven (T13)."
 )
 
 
@@ -119,7 +126,30 @@ def torque(result: Result) -> list[Table]:
         return []
     rows = [(point.name, *_torque_cells(torque_facts(engine, point, problem.fidelity))) for point in problem.points]
     head = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity")
-    return [Table(head, rows, title="Torque of the crankshaft", note=TORQUE, file="crankshaft-torque")]
+    return [
+        Table(head, rows, title="Torque of the crankshaft", note=TORQUE, file="crankshaft-torque"),
+        *_even_speeds(result),
+    ]
+
+
+def _even_speeds(result: Result) -> list[Table]:
+    """Return the speeds that keep a limit on the degree of irregularity, by limit and operating point."""
+    engine, fidelity = result.final.engine, result.problem.fidelity
+    inertia = turning_inertia(engine, fidelity)
+    rows = []
+    for limit in result.problem.limits:
+        for point in result.problem.points:
+            if limit.measure.channel is IRREGULARITY and inertia is not None and limit.measure.includes_point(point):
+                ranges = swing_of(engine, point, fidelity).speed_ranges(limit.maximum, inertia)
+                rows.append((limit.name, point.name, "; ".join(starmap(_range_text, ranges)) or DASH))
+    head = ("limit", "gas and load of", "speeds [rpm]")
+    return [Table(head, rows, title="Speeds that keep the limit", note=EVEN, file="even-speeds")] if rows else []
+
+
+def _range_text(low: float, high: float) -> str:
+    if math.isinf(high):
+        return f"from {number(low * RPM, 5)}" if low else "all"
+    return f"{number(low * RPM, 5)} to {number(high * RPM, 5)}"
 
 
 def _torque_cells(facts: TorqueFacts) -> list[str]:
