@@ -27,6 +27,7 @@ VIEW = {"viewport": {"width": 1280, "height": 900}, "device_scale_factor": 0.7}
 WANTED = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
     ("balance", "vee-eight-balance-job"): {"planes": "balance-job"},
+    ("solve", "tractor-seat"): {"receivers": "tractor-seat-receivers"},
     ("study", "tractor-study"): {name: f"tractor-study-{name}" for name in ("fig-10", "fig-22", "reciprocating-mass")},
     ("study", "torsion-pareto"): {"firing-order": "torsion-pareto"},
     ("study", "bearing-pareto"): {"mount-force": "bearing-pareto"},

@@ -54,10 +54,12 @@ class Felt:
 
     def __init__(self, path: Path) -> None:
         self.folder, self.table = path.parent, tomllib.loads(path.read_text(encoding="utf-8"))
-        self.frame = None if "frame" not in self.table else self._frame(self.table["frame"])
+        mounts = self.table["mounts"]
+        self.mounts = mounts["names"] if "names" in mounts else [place["name"] for place in mounts["places"]]
+        self.frame = None if "frame" not in self.table else self.frame_of(self.table["frame"])
 
     @staticmethod
-    def _frame(table: Table) -> Frame:
+    def frame_of(table: Table) -> Frame:
         numbers = [parse(text, "kg m^2") for text in table["inertia"]]
         centre = tuple(parse(text, "m") for text in table["centre_of_gravity"])
         springs = []
@@ -131,7 +133,7 @@ class Felt:
     def _transferred(self, receiver: Table, w: float, forces: np.ndarray) -> np.ndarray:
         files, f = receiver["transfer_functions"], w / (2.0 * math.pi)
         parts = []
-        for component in ["sound"] if receiver["unit"] == "Pa" else AXES:
+        for component in ["sound"] if receiver.get("unit") == "Pa" else AXES:
             total = 0.0j
             if component in files:
                 with (self.folder / files[component]).open(encoding="utf-8") as stream:
@@ -142,14 +144,11 @@ class Felt:
                     pair = numbers[:, column] + 1j * numbers[:, column + 1]
                     if words[-1] == "magnitude":
                         pair = numbers[:, column] * np.exp(1j * np.radians(numbers[:, column + 1]))
-                    place = [m.name for m in self.mounts(forces)].index(" ".join(words[:-2]))
+                    place = self.mounts.index(" ".join(words[:-2]))
                     h = np.interp(f, numbers[:, 0], pair.real) + 1j * np.interp(f, numbers[:, 0], pair.imag)
                     total += h * forces[place, AXES.index(words[-2])]
             parts.append(total)
         return np.array(parts)
-
-    def mounts(self, forces: np.ndarray) -> list[Mount]:
-        return [Mount(f"m{k}", (0.0, 0.0, 0.0)) for k in range(len(forces))]
 
 
 def q(value: float, unit: str) -> str:

@@ -11,15 +11,18 @@ import pytest
 
 import laufruhe
 from attack.families import toml
+from extensions.receivers import tractor_seat
 from extensions.receivers.felt import Felt, draw, functions
 from lanes import first_fast
 from laufruhe.errors import InputError
 from laufruhe.extensions.receivers.section import SECTION
 from laufruhe.plots import figure
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Term
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from picture_faults import faults_of
+from problem_files import PROBLEMS
 
 UNITS = {"acceleration": "m/s^2", "velocity": "m/s", "pressure": "Pa"}
 
@@ -62,6 +65,31 @@ def test_values_are_those_of_forces_over_the_cycle_and_no_bound_is_false(kind: s
     assert result.certificate.kind == "global"
     values = [measured(path, design) for design in random_designs(result.problem, 4)]
     assert result.certificate.lower_bound <= min(values)
+
+
+READY = {"motorcycle-handlebar": (1.343006, 1.401994), "tractor-seat": (0.0509373, 0.0731950)}
+"""Weighted response of the ready problems, and that of the design of least mean mount force."""
+
+
+@pytest.mark.parametrize("name", first_fast(READY, 0))
+def test_least_mount_force_is_not_what_is_felt_least(name: str) -> None:
+    """With the figures that the page of receivers tells."""
+    path, (best, other) = PROBLEMS / f"{name}.toml", READY[name]
+    problem = laufruhe.load(path)
+    by_response = laufruhe.solve(problem)
+    by_force = laufruhe.solve(problem.changed(objective=(Term(MEAN_MOUNT_FORCE),)))
+    for result, value in ((by_response, best), (by_force, other)):
+        assert result.certificate is not None
+        assert result.certificate.kind == "global"
+        assert result.final.value(problem.objective[0].measure) == pytest.approx(value, rel=1e-5)
+    assert measured(path, by_response.final) == pytest.approx(best, rel=1e-5)
+
+
+def test_functions_of_the_seat_are_those_of_its_model(tmp_path: Path) -> None:
+    tractor_seat.write(tmp_path)
+    for axis in "xyz":
+        name = f"tractor-seat-{axis}.csv"
+        assert (tmp_path / name).read_text(encoding="utf-8") == (PROBLEMS / name).read_text(encoding="utf-8")
 
 
 def test_signals_are_affine_in_weights_and_masses(tmp_path: Path) -> None:

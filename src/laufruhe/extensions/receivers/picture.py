@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.extensions.receivers.facts import (
     OrderAmplitudes,
@@ -16,7 +16,8 @@ from laufruhe.extensions.receivers.facts import (
     unit_of,
     weighting_words,
 )
-from laufruhe.extensions.receivers.machine import Receiver, receivers_of
+from laufruhe.extensions.receivers.machine import FrequencyFunction, Receiver, receivers_of
+from laufruhe.extensions.receivers.weightings import Weighting
 from laufruhe.machine import OperatingPoint
 from laufruhe.plots.speed_axis import STYLES, mark_points
 from laufruhe.plots.style import ORANGE, Series, axis_end, entry, finish_page, page, series_of, styled
@@ -39,13 +40,16 @@ def figure(result: Result) -> Figure:
     hardest = _hardest(result, receivers[0])
     for k, receiver in enumerate(receivers):
         answers = [amplitudes_of(receiver, item.design.loads[hardest]) for item in series]
-        _draw_spectrum(layout.panels[k], receiver, series, answers)
+        _draw_spectrum(layout.panels[k], receiver, series, answers, _curves(receivers))
         _draw_speeds(layout.panels[len(receivers) + k], receiver, result, series, points)
     name = result.problem.points[hardest].name
     legend: list[Artist] = [item.entry(": weighted") for item in series]
-    if any(curve is not None for receiver in receivers for curve in receiver.weightings):
-        legend.append(entry("weighting, times the largest amplitude", color=ORANGE, linewidth=1.2))
-        legend.append(entry("without weighting", color=FAINT, marker="_", linestyle="none"))
+    curves = _curves(receivers)
+    legend += [
+        entry(f"{curve.name}, times the largest amplitude", color=ORANGE, linewidth=1.2, linestyle=style)
+        for curve, style in zip(curves, STYLES, strict=False)
+    ]
+    legend += [entry("without weighting", color=FAINT, marker="_", linestyle="none")] if curves else []
     if len(points) > 1:
         legend += [entry(f"load of {p.name}", color=INK, linestyle=s) for p, s in zip(points, STYLES, strict=False)]
     lines = f"Above: amplitude of every order at {name}. Below: root mean square over the cycle, weighted, over speed."
@@ -74,7 +78,15 @@ def _hardest(result: Result, receiver: Receiver) -> int:
     return int(np.argmax(sizes))
 
 
-def _draw_spectrum(axes: Axes, receiver: Receiver, series: list[Series], answers: list[OrderAmplitudes]) -> None:
+def _curves(receivers: list[Receiver]) -> list[Weighting | FrequencyFunction]:
+    curves = [curve for receiver in receivers for curve in receiver.weightings if curve is not None]
+    return list(dict.fromkeys(curves))
+
+
+def _draw_spectrum(
+    axes: Axes, receiver: Receiver, series: list[Series], answers: list[OrderAmplitudes],
+    curves: list[Weighting | FrequencyFunction],
+) -> None:  # fmt: skip
     top = axis_end(float(answer.plain.max(initial=0.0)) for answer in answers)
     seen = [answer.frequencies[answer.plain > SHARE * top] for answer in answers]
     drawn = np.concatenate([*seen, [10.0]])
@@ -85,11 +97,13 @@ def _draw_spectrum(axes: Axes, receiver: Receiver, series: list[Series], answers
         places = answer.frequencies[visible] * (1.0 + 0.012 * (2 * j - len(series) + 1))
         axes.vlines(places, 0.0, answer.weighted[visible], color=item.colour, linewidth=2.4)
         axes.plot(places, answer.plain[visible], linestyle="none", marker="_", markersize=7.0, color=item.colour)
-    curve = next((curve for curve in receiver.weightings[::-1] if curve is not None), None)
-    if curve is not None:
-        inside = np.geomspace(max(low, receiver.band[0]), min(high, receiver.band[1]), 300)
-        axes.plot(inside, top * np.abs(receiver.weights(inside)).max(axis=1), color=ORANGE, linewidth=1.2, zorder=1.5)
+    inside = np.geomspace(max(low, receiver.band[0]), min(high, receiver.band[1]), 300)
+    for curve, style in zip(curves, STYLES, strict=False):
+        if curve in receiver.weightings:
+            factors = top * np.abs(curve.at(inside)).ravel()
+            axes.plot(inside, factors, color=ORANGE, linewidth=1.2, linestyle=style, zorder=1.5)
     axes.set(xscale="log", xlim=(low, high), ylim=(0.0, 1.15 * top), xlabel="frequency [Hz]")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     axes.set_ylabel(f"{receiver.name} [{unit_of(receiver)}]")

@@ -30,8 +30,8 @@ def _tables(result: Result) -> list[Table]:
                 figure(answer.rms, unit), _strongest(answer),
             ))  # fmt: skip
     note = (
-        "Root mean square of the final design over the cycle. Strongest: the frequencies with the largest weighted "
-        "amplitudes, and their orders."
+        "Root mean square of the final design over the cycle, without direction weights of objective and limits. "
+        "Strongest: the frequencies with the largest weighted amplitudes."
     )
     head = ("at", "receiver", "weighting", "without weighting", "weighted", "strongest")
     return [Table(head, tuple(rows), title="What receivers feel", left=3, note=note, file="receivers")]
