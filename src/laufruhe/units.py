@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -285,10 +288,33 @@ _UNITS = {
 }
 
 
-def readable(unit: str) -> tuple[str, float]:
-    """Return the unit of reports for an SI unit, with powers as printed, and the factor on an SI value."""
+_preferences: ContextVar[Mapping[str, str]] = ContextVar("units", default=MappingProxyType({}))
+
+
+@contextmanager
+def shown_in(units: Mapping[str, str]) -> Iterator[None]:
+    """Let `readable` return other units within the block, by SI unit: those that a user wants to read."""
+    token = _preferences.set(units)
+    try:
+        yield
+    finally:
+        _preferences.reset(token)
+
+
+def readable(unit: str, usual: str = "") -> tuple[str, float]:
+    """Return the unit of reports for an SI unit, with powers as printed, and the factor on an SI value.
+
+    The unit is that of `shown_in`, else `usual`, else the usual one of reports.
+    """
     name, factor = _UNITS.get(unit, (unit, 1.0))
+    if other := _preferences.get().get(unit, usual):
+        name, factor = other, 1.0 / _factor(other, unit)
     return name.replace("^2", "²").replace("^3", "³"), factor
+
+
+def is_shown(unit: str) -> bool:
+    """Return True if a user wants to read an SI unit in a unit of his own."""
+    return unit in _preferences.get()
 
 
 def quantity_text(value: float, unit: str, digits: int = 4) -> str:

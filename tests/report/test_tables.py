@@ -19,6 +19,8 @@ from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, headline, why_star
 from laufruhe.solvers import Result
 from laufruhe.studies.text import marked_table
+from laufruhe.units import readable, shown_in
+from problem_files import PROBLEMS
 from ready import solved
 
 _OPEN_FACTOR = """
@@ -120,6 +122,38 @@ def test_a_page_alone_holds_the_problem() -> None:
     left = next(rotor for rotor in result.final.engine.rotors if rotor.name == "left")
     assert float(rows["left"][5]) == pytest.approx(1e6 * abs(left.unbalance), rel=1e-4)
     assert rows["cylinder 3"] == ["-62.5", "0", "180", "180", "100", "120", "230.77", "0", "1.25"]
+
+
+def test_a_reader_gets_units_of_his_choice() -> None:
+    """Numbers in other units are those in usual units, but for the rounding of both."""
+    units = {"N": "lbf", "kg": "lb", "kg m": "oz in", "m": "in"}
+    pounds = {"N": 0.45359237 * 9.80665, "g mm": 0.45359237e6 / 16 * 0.0254, "mm": 25.4, "g": 453.59237}
+    names = {"N": "lbf", "g mm": "oz in", "mm": "in", "g": "lb", "N, N m": "lbf, N m"}
+    result = solved("tractor-four-lanchester")
+    usual = tables_of(result)
+    with shown_in(units):
+        other, line = tables_of(result), headline(result)
+    assert " lbf" in line
+    seen = set()
+    for mine, theirs in zip(usual, other, strict=True):
+        for k, (head, other_head) in enumerate(zip(mine.head, theirs.head, strict=True)):
+            of_title = re.search(r"\[(N)\]$", mine.title)
+            unit = re.search(r"\[(g mm|mm|g)\]$", head) or of_title
+            if unit is None or k == 0:
+                continue
+            assert f"[{names[unit.group(1)]}]" in (theirs.title if unit is of_title else other_head)
+            for before, after in zip(mine.rows, theirs.rows, strict=True):
+                if "%" not in before[k] and before[k] not in ("-", "–"):
+                    assert float(after[k]) == pytest.approx(float(before[k]) / pounds[unit.group(1)], rel=1e-3)
+                    seen.add(unit.group(1))
+    assert seen >= {"N", "g mm", "mm"}
+    assert readable("N") == ("N", 1.0)
+
+
+def test_units_of_another_dimension_are_refused() -> None:
+    text = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
+    with pytest.raises(laufruhe.InputError, match="'mm' is not a unit of a force"):
+        laufruhe.load(f'units = {{ force = "mm" }}\n{text}')
 
 
 def test_source_and_assumptions_are_told() -> None:

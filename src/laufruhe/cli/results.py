@@ -17,6 +17,7 @@ from laufruhe.report.result_report import result_document
 from laufruhe.report.tables import write_tables
 from laufruhe.report.web_page import as_html, template
 from laufruhe.solvers.result import Result, Status
+from laufruhe.units import shown_in
 
 
 def write_results(
@@ -38,7 +39,8 @@ def write_results(
         with timed(result.timing, "tables"):
             tables = stack.enter_context(write_tables(result, stage))
         page_model = live_model(result.problem, result)
-        document = result_document(result, list(PICTURES), request.command)
+        with shown_in(dict(result.problem.shown_units)):
+            document = result_document(result, list(PICTURES), request.command)
         if request.kinds:
             say("drawing")
         with timed(result.timing, "plots"):
@@ -66,6 +68,7 @@ def show(request: Request, result: Result, folder: Path) -> None:
     if not is_quiet():
         from laufruhe.report import screen
 
-        screen.show(result, sys.stdout if text is None else sys.stderr, folder)
+        with shown_in(dict(result.problem.shown_units)):
+            screen.show(result, sys.stdout if text is None else sys.stderr, folder)
     if result.status in (Status.INFEASIBLE, Status.FAILED):
         complain(f"{result.problem.name}: {result.status}: {result.message}")

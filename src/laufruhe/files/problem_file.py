@@ -13,6 +13,7 @@ from pydantic import Field, create_model
 from laufruhe.extension import extended
 from laufruhe.files import fields as f
 from laufruhe.files.bearings import MainBearingTable
+from laufruhe.files.complaints import si_value
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
@@ -144,6 +145,25 @@ class SearchTable(Table):
     )
 
 
+class UnitsTable(Table):
+    """Units of the report's tables and of the screen; other files stay in SI units and in those of their heads."""
+
+    closed: ClassVar[str] = "is a unit of the report, not a number of the engine"
+
+    force: str | None = f.optional("Unit of forces.")
+    mass: str | None = f.optional("Unit of masses.")
+    unbalance: str | None = f.optional("Unit of unbalances.")
+    length: str | None = f.optional("Unit of lengths.")
+
+    def by_si_unit(self) -> tuple[tuple[str, str], ...]:
+        """Return pairs of an SI unit and a unit in its place; raise `Refused` for a unit of another dimension."""
+        named = {"N": "force", "kg": "mass", "kg m": "unbalance", "m": "length"}
+        units = {si: getattr(self, key) for si, key in named.items() if getattr(self, key) is not None}
+        for si, unit in units.items():
+            si_value(f"1 {unit}", si, f"units.{named[si]}", unit)
+        return tuple(units.items())
+
+
 class ProblemFile(Table):
     """Problem file."""
 
@@ -151,6 +171,7 @@ class ProblemFile(Table):
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)
     tolerance: f.Tolerance = f.optional("Relative gap at which an optimum counts as proven.", 1e-4)
+    units: UnitsTable = Field(default_factory=UnitsTable)
     engine: EngineTable
     quantities: QuantitiesTable | None = None
     phasing: PhasingTable | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from laufruhe.units import readable
+from laufruhe.units import is_shown, readable
 
 if TYPE_CHECKING:
     from laufruhe.solvers.values import DecisionValue, LimitValue
@@ -73,9 +73,9 @@ _WORKSHOP = {"kg": ("g", 1e3), "kg m": ("g mm", 1e6)}
 def in_grams(value: float, unit: str, scale: float) -> str:
     """Return a mass or an unbalance once more in workshop units, as " = 12 g" or " = 30 g mm".
 
-    The text is empty for other units, and for values that are zero by rounding of `scale`.
+    The text is empty for other units, for values that are zero by rounding of `scale`, and if the user chose a unit.
     """
-    if unit not in _WORKSHOP or abs(value) <= ROUNDS_TO_ZERO * scale:
+    if unit not in _WORKSHOP or is_shown(unit) or abs(value) <= ROUNDS_TO_ZERO * scale:
         return ""
     name, factor = _WORKSHOP[unit]
     return f" = {number(value * factor)} {name}"

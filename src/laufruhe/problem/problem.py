@@ -187,6 +187,8 @@ class Problem(Goals, Statements):
         Objectives in order of priority, the first equal to `objective`; empty for a single objective.
     fires_together
         True if cylinders are meant to fire at once.
+    shown_units
+        Pairs of an SI unit and the unit of reports in its place.
     warnings
         Warnings about the file, which stop nothing.
     friction
@@ -216,6 +218,7 @@ class Problem(Goals, Statements):
     sharply: bool = False
     ranks: tuple[PriorityLevel, ...] = ()
     fires_together: bool = False
+    shown_units: tuple[tuple[str, str], ...] = ()
     warnings: tuple[Complaint, ...] = ()
     friction: tuple[FrictionTest, ...] = ()
     known_rows: Mapping[Measure, KnownRows] = field(default_factory=dict, compare=False, repr=False)

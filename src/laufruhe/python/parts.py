@@ -16,6 +16,27 @@ from laufruhe.python.keys import Parts, keys_of
 class EngineParts(Parts):
     """Methods that add a table of a problem file to an engine; each returns a new engine."""
 
+    def units(
+        self, *, force: str | None = None, mass: str | None = None, unbalance: str | None = None,
+        length: str | None = None,
+    ) -> Self:
+        """Return the engine with units.
+
+        Units of the report's tables and of the screen; other files stay in SI units and in those of their heads.
+
+        Parameters
+        ----------
+        force
+            Unit of forces.
+        mass
+            Unit of masses.
+        unbalance
+            Unit of unbalances.
+        length
+            Unit of lengths.
+        """
+        return self._with("units", "units", keys_of(locals()))
+
     def quantities(
         self, *, stroke_over_bore: Value | None = None,
     ) -> Self:

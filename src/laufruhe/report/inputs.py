@@ -15,31 +15,31 @@ from laufruhe.machine import Engine, Mount, Rotor, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.machine.mount import every_spring
 from laufruhe.physics.rigid_body import turns_of
-from laufruhe.present.numbers import DASH, DEGREE, fixed, trimmed
+from laufruhe.present.numbers import DASH, DEGREE, fixed, trimmed, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.problem.problem import Problem
 from laufruhe.units import readable
 
-HEAD = (
-    "", "x [mm]", "bank [deg]", "throw [deg]", "fires at [deg]", "bore [mm]", "stroke [mm]", "rod [mm]", "offset [mm]",
-    "reciprocating mass [kg]",
-)  # fmt: skip
-ROTORS = ("", "shaft", "ratio", "x [mm]", "y [mm]", "z [mm]", "unbalance [g mm]", "angle [deg]")
 NOTE = "Throws at a crank angle of 0, the firing dead centre of cylinder 1 (C5). The offset is that of the pin's path."
-MOUNTS = ("mount", "x [mm]", "y [mm]", "z [mm]", "stiffness along its axes", "its axes turned [deg]")
 OF_MOUNTS = "Positions in the axes of the engine (C2). Axes are turned about x, then y, then z (E2)."
 OF_ROTORS = "The unbalance of a throw is its rotating mass times the crank radius. Angles at a crank angle of 0 (C4)."
 
 
 def input_tables(problem: Problem, engine: Engine) -> list[Table]:
     """Return tables of the engine of a result: what it is, and the numbers of its cylinders and rotating parts."""
-    rows = list(_engine_rows(problem, engine))
+    length, mass, unbalance = readable("m")[0], readable("kg")[0], readable("kg m", "g mm")[0]
+    x, y, z = (f"{axis} [{length}]" for axis in "xyz")
+    sizes = (f"{name} [{length}]" for name in ("bore", "stroke", "rod", "offset"))
+    of_cylinder = ("", x, "bank [deg]", "throw [deg]", "fires at [deg]", *sizes, f"reciprocating mass [{mass}]")
+    of_rotor = ("", "shaft", "ratio", x, y, z, f"unbalance [{unbalance}]", "angle [deg]")
+    of_mount = ("mount", x, y, z, "stiffness along its axes", "its axes turned [deg]")
     cylinders = [_cylinder(part) for part in engine.slider_cranks]
     rotors = [_rotor(rotor) for rotor in (*engine.pins, *engine.rotors)]
-    tables = [Table(("input", "value"), rows, left=2), Table(HEAD, cylinders, note=NOTE)]
-    tables += [Table(ROTORS, rotors, left=2, note=OF_ROTORS)] if rotors else []
+    tables = [Table(("input", "value"), list(_engine_rows(problem, engine)), left=2)]
+    tables += [Table(of_cylinder, cylinders, note=NOTE)]
+    tables += [Table(of_rotor, rotors, left=2, note=OF_ROTORS)] if rotors else []
     springs = [_mount(mount, engine.block is None) for _, mount in every_spring(engine.mounts)]
-    return [*tables, *([Table(MOUNTS, springs, note=OF_MOUNTS)] if springs else [])]
+    return [*tables, *([Table(of_mount, springs, note=OF_MOUNTS)] if springs else [])]
 
 
 def _engine_rows(problem: Problem, engine: Engine) -> Iterator[tuple[str, str]]:
@@ -63,28 +63,31 @@ def _engine_rows(problem: Problem, engine: Engine) -> Iterator[tuple[str, str]]:
             ", ".join(f"{key} {value}" for key, value in tables["gas"].items() if isinstance(value, str | int | float)),
         )
     if engine.block is not None:
-        yield "mass on the mounts", f"{trimmed(engine.block.mass)} kg"
+        yield "mass on the mounts", with_unit(engine.block.mass, "kg")
 
 
 def _cylinder(part: SliderCrank) -> tuple[str, ...]:
     angles = (part.bank, part.throw, part.firing_angle)
+    factor = readable("m")[1]
     lengths = (part.bore, part.stroke, part.rod_length, part.offset)
     return (
-        part.name, trimmed(1e3 * part.x), *(trimmed(DEGREE * angle) for angle in angles),
-        *(DASH if length is None or math.isinf(length) else trimmed(1e3 * length, 5) for length in lengths),
-        trimmed(part.reciprocating_mass),
+        part.name, trimmed(factor * part.x), *(trimmed(DEGREE * angle) for angle in angles),
+        *(DASH if length is None or math.isinf(length) else trimmed(factor * length, 5) for length in lengths),
+        trimmed(readable("kg")[1] * part.reciprocating_mass),
     )  # fmt: skip
 
 
 def _rotor(rotor: Rotor) -> tuple[str, ...]:
     size, angle = abs(rotor.unbalance), cmath.phase(rotor.unbalance)
-    place = (trimmed(1e3 * length) for length in (rotor.x, rotor.shaft.y, rotor.shaft.z))
+    factor, millimetres = readable("kg m", "g mm")[1], readable("m")[1]
+    place = (trimmed(millimetres * length) for length in (rotor.x, rotor.shaft.y, rotor.shaft.z))
     turn = trimmed(DEGREE * (angle % math.tau)) if size else DASH
-    return rotor.name, rotor.shaft.name, trimmed(rotor.shaft.ratio), *place, trimmed(1e6 * size, 5), turn
+    return rotor.name, rotor.shaft.name, trimmed(rotor.shaft.ratio), *place, trimmed(factor * size, 5), turn
 
 
 def _mount(mount: Mount, is_rigid: bool) -> tuple[str, ...]:
-    place = (trimmed(1e3 * length) for length in mount.position)
+    millimetres = readable("m")[1]
+    place = (trimmed(millimetres * length) for length in mount.position)
     name, factor = ("", 1.0) if is_rigid else readable("N/m")
     stiffness = ", ".join(trimmed(factor * value) for value in mount.stiffness) + f" {name}".rstrip()
     turns = ", ".join(fixed(DEGREE * angle, 2) for angle in turns_of(np.array(mount.orientation)))

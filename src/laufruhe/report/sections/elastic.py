@@ -14,6 +14,7 @@ from laufruhe.present.tables import Table
 from laufruhe.problem.channels import MOUNT_TRAVEL, mounting_in
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
 
 def modes(result: Result) -> list[Table]:
@@ -48,13 +49,13 @@ def _modes(facts: MountingFacts, title: str) -> Table:
 
 
 def _mounts(result: Result, facts: MountingFacts) -> Table:
-    rows, points = [], result.problem.points
+    rows, points, (unit, factor) = [], result.problem.points, readable("m")
     slowest = min(range(len(points)), key=lambda k: points[k].speed)
     travels = place_measures(result.final, slowest, MOUNT_TRAVEL)
     for k, spring in every_spring(result.final.engine.mounts):
         stiffness = " / ".join(trimmed(1e-3 * k) for k in spring.stiffness)
-        place = ", ".join(trimmed(1e3 * c) for c in spring.position)
-        sag, largest_travel = number(1e3 * facts.mount_sag[k]), number(1e3 * travels[k].max)
+        place = ", ".join(trimmed(factor * c) for c in spring.position)
+        sag, largest_travel = number(factor * facts.mount_sag[k]), number(factor * travels[k].max)
         rows.append((spring.name, place, stiffness, trimmed(spring.loss_factor), sag, largest_travel))
     axis = ", ".join(fixed(c, 3) for c in facts.torque_roll_axis)
     note = (
@@ -64,8 +65,8 @@ def _mounts(result: Result, facts: MountingFacts) -> Table:
         f"Turning about the torque-roll axis ({axis}) is {100.0 * facts.torque_roll_coupling:.3g} % from being a mode; "
         f"best fit at {facts.torque_roll_frequency:.3g} Hz."
     )
-    head = ("mount", "place [mm]", "stiffness along its axes [N/mm]", "loss factor", "sag [mm]",
-            f"travel at {points[slowest].name} [mm]")  # fmt: skip
+    head = ("mount", f"place [{unit}]", "stiffness along its axes [N/mm]", "loss factor", f"sag [{unit}]",
+            f"travel at {points[slowest].name} [{unit}]")  # fmt: skip
     return Table(head, rows, title="Mounts", left=3, note=note)
 
 
@@ -74,12 +75,19 @@ def load_cases(result: Result) -> list[Table]:
     if not is_elastic(result) or not result.final.engine.load_cases:
         return []
     mounting, rows = mounting_in(result.final.engine), []
+    (length, millimetres), (unit, factor) = readable("m"), readable("N")
     for case in result.final.engine.load_cases:
         state = settled(mounting, case)
         for mount, travel, force in zip(mounting.mounts, state.travel, state.force, strict=True):
-            travels = (number(1e3 * along) for along in travel)
+            travels = (number(millimetres * along) for along in travel)
             on_stop = "yes" if mount.name in state.on_stops else DASH
-            rows.append((case.name, mount.name, *travels, number(float(np.linalg.norm(force))), on_stop))
-    head = ("load case", "mount", "travel x [mm]", "y [mm]", "z [mm]", "force [N]", "on its stop")
+            rows.append((case.name, mount.name, *travels, number(factor * float(np.linalg.norm(force))), on_stop))
+    head = (
+        "load case",
+        "mount",
+        *(f"{axis} [{length}]" for axis in ("travel x", "y", "z")),
+        f"force [{unit}]",
+        "on its stop",
+    )
     note = "Travel is measured from the position without these loads."
     return [Table(head, rows, title="Load cases", left=2, note=note, file="load-cases")]

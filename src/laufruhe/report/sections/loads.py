@@ -64,7 +64,7 @@ def _at_places(result: Result, places: Places) -> Table:
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The initial design has no finite loads: {result.initial.resonance}." if result.initial.resonance else ""
     if places.channel.sums_places:
-        sums = [number(design.value(Measure(places.channel))) for design in designs]
+        sums = [number(factor * design.value(Measure(places.channel))) for design in designs]
         note = f"Sum, mean over the cycle: {' initial, '.join(sums)}{' final' if len(sums) > 1 else ''}."
     two = ("initial mean", "final mean", "change", "initial max", "final max")
     head = (*first, *(two if len(designs) > 1 else ("mean", "max", "rms")))
@@ -91,7 +91,10 @@ def orders(result: Result) -> list[Table]:
     pairs = zip(*(_amplitudes(design.loads[k]) for design in designs), strict=True)
     series = [column for pair in pairs for column in pair]
     length = max(len(column) for column in series)
-    table = np.stack([pad_orders(column, length) for column in series], axis=1)
+    names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
+    unit, factor = readable("N")
+    factors = np.repeat([factor if "force" in name else 1.0 for name in names], len(designs))
+    table = factors * np.stack([pad_orders(column, length) for column in series], axis=1)
     # a quantity has one scale, before and after
     scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
     weight = (table / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
@@ -100,12 +103,11 @@ def orders(result: Result) -> list[Table]:
     base = float(result.initial.loads[k].wrench.base)
     cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in largest)
     rows = [(f"{j * base:g}", *row) for j, row in zip(largest, cells, strict=True)]
-    names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
     sides = ("",) if len(designs) == 1 else (", initial", ", final")
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
     selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
     note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
-    return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [N, N m]", note=note)]
+    return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [{unit}, N m]", note=note)]
 
 
 def _amplitudes(loads: PointLoads) -> list[Array]:

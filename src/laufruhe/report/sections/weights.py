@@ -11,9 +11,8 @@ from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
-GRAMS = 1e3
-GRAM_MILLIMETRES = 1e6
 NEXT_TO_NOTHING = 1e-9
 _ANGLES = "Angles at a crank angle of 0, clockwise from the top, seen from the front (C4)."
 _FACTOR = (
@@ -24,6 +23,9 @@ _FACTOR = (
 
 def weights(result: Result) -> list[Table]:
     """Return a table of the counterweights and balancers of the final design, a row for each."""
+    (length, millimetres), (unbalance, size), (mass_unit, grams) = (
+        readable("m"), readable("kg m", "g mm"), readable("kg", "g")
+    )  # fmt: skip
     before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
     rotors = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
     scale, two, rows = max((abs(rotor.unbalance) for rotor in rotors), default=0.0), is_changed(result), []
@@ -33,23 +35,25 @@ def weights(result: Result) -> list[Table]:
             continue
         mass, radius = DASH, DASH
         if rotor.radius is not None:
-            mass, radius = number(GRAMS * rotor.mass, scale=GRAMS * scale / rotor.radius), trimmed(1e3 * rotor.radius)
-        lead = _in_grams(initial, scale) if two else ()
-        rows.append((rotor.name, trimmed(1e3 * rotor.x), *lead, *_in_grams(rotor, scale),
+            mass = number(grams * rotor.mass, scale=grams * scale / rotor.radius)
+            radius = trimmed(millimetres * rotor.radius)
+        lead = _size_and_angle(initial, scale, size) if two else ()
+        rows.append((rotor.name, trimmed(millimetres * rotor.x), *lead, *_size_and_angle(rotor, scale, size),
                      number(abs(rotor.unbalance), scale=scale), mass, radius))  # fmt: skip
     sides = ("initial ", "final ") if two else ("",)
-    sizes = [f"{side}{what} [{unit}]" for side in sides for what, unit in (("unbalance", "g mm"), ("angle", "deg"))]
-    head = ("weight", "x [mm]", *sizes, f"{sides[-1]}unbalance [kg m]", "mass [g]", "at radius [mm]")
+    sizes = [f"{side}{what} [{unit}]" for side in sides for what, unit in (("unbalance", unbalance), ("angle", "deg"))]
+    head = ("weight", f"x [{length}]", *sizes, f"{sides[-1]}unbalance [kg m]", f"mass [{mass_unit}]",
+            f"at radius [{length}]")  # fmt: skip
     title = "Weights" + (" of the final design" if two else "")
     return [Table(head, rows, title=title, note=_ANGLES, file="weights")]
 
 
-def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
+def _size_and_angle(rotor: Rotor, scale: float, factor: float) -> tuple[str, str]:
     size = abs(rotor.unbalance)
     if size <= NEXT_TO_NOTHING * scale:
         return "0", DASH
     angle = round(math.degrees(cmath.phase(rotor.unbalance)) % 360.0, 4) % 360.0
-    return number(GRAM_MILLIMETRES * size), trimmed(angle, 5)
+    return number(factor * size), trimmed(angle, 5)
 
 
 def factors(result: Result) -> list[Table]:
