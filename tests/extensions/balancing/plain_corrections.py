@@ -1,6 +1,7 @@
 """Corrections by brute force: every choice of holes of a file, in mm, g and degrees, without code of the package.
 
-`python tests/extensions/balancing/plain_corrections.py 200` compares that many random files with the command's answer.
+`python tests/extensions/balancing/plain_corrections.py 200 3` compares the command's answer on 200 random files with at
+most 3 holes in a plane.
 """
 
 from __future__ import annotations
@@ -205,7 +206,7 @@ def mismatches(seed: int, max_holes: int = 3) -> list[str]:
 
 
 if __name__ == "__main__":
-    COUNT = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    FAULTS = [fault for seed in range(COUNT) for fault in mismatches(seed)]
+    COUNT, HOLES = (int(word) for word in (*sys.argv[1:], *("200", "3")[len(sys.argv) - 1 :]))
+    FAULTS = [fault for seed in range(COUNT) for fault in mismatches(seed, HOLES)]
     print("\n".join([*FAULTS, f"{COUNT} random files, {len(FAULTS)} mismatches"]))
     sys.exit(bool(FAULTS))

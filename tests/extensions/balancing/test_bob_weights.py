@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from laufruhe.errors import InputError
-from laufruhe.extensions.balancing.bob_weights import BobWeights, card
+from laufruhe.extensions.balancing.bob_weights import SECTION, BobWeights, card
 from laufruhe.files.reader import load
+from laufruhe.solvers import evaluate_only
 from problem_files import FOUR
 
 V8 = """
@@ -23,6 +24,7 @@ rod_ratio = 0.3
 reciprocating_mass = "994.2 g"
 """
 POINT = '[[operating_points]]\nspeed = "5000 rpm"\n'
+END = 'balance_factor = 0.5\nbig_end = "1 kg"\n'
 
 
 def weights_of(engine: str, table: str) -> BobWeights:
@@ -91,7 +93,14 @@ def test_the_card_has_a_column_for_each_pin_that_differs_and_says_what_the_engin
     assert "600.0 g, but [engine] has 1250.0 g" in sheet.note
 
 
-END = 'balance_factor = 0.5\nbig_end = "1 kg"\n'
+def test_results_have_the_card() -> None:
+    result = evaluate_only(load(f"{V8}\n{POINT}[bob_weights]\n{END}"))
+    assert SECTION.applies(result)
+    assert SECTION.record is not None
+    record = SECTION.record(result)
+    assert [throw["bob_weight"] for throw in record["throws"]] == pytest.approx([2.0 + 0.9942] * 4)
+    assert [table.file for table in SECTION.tables(result)] == ["bob-weights"]
+    assert not SECTION.applies(evaluate_only(load(f"{V8}\n{POINT}")))
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from laufruhe.machine.rotor import permitted_unbalance
 Tables = dict[str, Any]
 STEEL = 7840.0
 # of the 200 random files of `plain_corrections`: all ways of holes, slugs and sectors, and every number of holes
-SEEDS = (2, 3, 5, 8, 9, 11, 14, 17)
+SEEDS = (0, 4, 5, 13, 22, 37, 42, 55)
 
 
 def read(tables: Tables) -> Correction:
@@ -40,18 +40,18 @@ def test_a_broken_bound_of_sets_is_an_error(monkeypatch: pytest.MonkeyPatch) -> 
     usual = search.set_bounds
     monkeypatch.setattr(search, "set_bounds", lambda *args: usual(*args) + 1e-3)
     with pytest.raises(BoundError, match="sets of places"):
-        answer(random_file(8))
+        answer(random_file(13))
     monkeypatch.delenv("LAUFRUHE_STRICT")
     # without that setting the design stays, and is not called proven
-    broken = answer(random_file(8))
+    broken = answer(random_file(13))
     assert not any(plane.is_least for plane in broken.planes)
 
 
 def test_brute_force_notices_a_search_that_leaves_out_sets(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search, "propose", lambda *_: None)
-    assert mismatches(8) == []
+    assert mismatches(22) == []
     monkeypatch.setattr(search, "combinations", lambda items, count: [tuple(items)[:count]])
-    assert mismatches(8) != []
+    assert mismatches(22) != []
 
 
 def turned(tables: Tables, by: float) -> Tables:
@@ -125,13 +125,19 @@ def test_zero_mark_and_sense_change_readings_only() -> None:
     assert sorted(holes(first)) == sorted(holes(second))
 
 
-def test_a_time_limit_claims_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("laufruhe.extensions.balancing.search.is_time_over", lambda: True)
+@pytest.mark.parametrize("goal", ["fewest holes", "least residual"])
+def test_without_time_there_is_a_design_but_no_proof(monkeypatch: pytest.MonkeyPatch, goal: str) -> None:
+    tables = random_file(13)
+    tables["correction"]["goal"] = goal
+    proven = answer(tables)
     monkeypatch.setattr("laufruhe.prove.branch_and_bound.is_time_over", lambda: True)
-    tables = random_file(8)
-    tables["correction"]["goal"] = "fewest holes"
-    result = answer(tables)
-    assert not any(plane.is_met or plane.is_fewest or plane.is_least for plane in result.planes)
+    for hasty, plane in zip(answer(tables).planes, proven.planes, strict=True):
+        assert plane.is_least
+        assert not hasty.is_fewest
+        assert not hasty.is_least
+        assert hasty.plane.is_allowed(hasty.design)
+        assert len(hasty.design) > 0
+        assert abs(plane.residual) <= abs(hasty.residual) < abs(hasty.plane.initial)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import typer
 from typer.models import CommandInfo
 
 from laufruhe.cli import options as o
-from laufruhe.cli.screen import FAILED, exit_statuses, handing_out, resources, spoken
+from laufruhe.cli.screen import FAILED, exit_statuses, handing_out, progress, resources, spoken
 
 FILE = "File (TOML) with [correction] or [bob_weights]; - reads standard input."
 OUT = "Folder of the results.  [default: results/<name of the file>-balance]"
@@ -33,7 +33,8 @@ def balance(
     ):  # fmt: skip
         from laufruhe.extensions.balancing.report import balanced
 
-        text, data, is_met = balanced(file, out, kind.kinds)
+        with progress() as say:
+            text, data, is_met = balanced(file, out, kind.kinds, say)
         hand_out(text, data)
         if not is_met:
             raise typer.Exit(FAILED)

@@ -25,7 +25,7 @@ from laufruhe.numerics.exact_angles import direction
 from laufruhe.problem.problem import Problem
 
 MAX_PLACES, MAX_HOLES = 48, 8
-MAX_SETS, MAX_HALF = 300_000, 3_000_000
+MAX_SETS, MAX_HALF = 300_000, 300_000
 """Largest number of sets of places, and of choices of holes in half of a set."""
 _ROUNDING = 1e-9
 Masses: TypeAlias = Annotated[list[f.Mass], f.ListOrSingle(f.Mass)]

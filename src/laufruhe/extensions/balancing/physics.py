@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.numerics.arrays import ComplexArray, Mask
+from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 
 SMALLEST_SHARE = 0.3
 """Smallest share of the permitted unbalance that a plane gets."""
@@ -135,6 +135,10 @@ class Plane:
             for angle, holes in zip(self.angles, self.holes, strict=True)
         )
 
+    def diameters(self, place: int) -> Array:
+        """Return the diameters of the holes of a place [m]."""
+        return np.array([hole.diameter for hole in self.holes[place]])
+
     def residual(self, design: Design) -> complex:
         """Return the unbalance after correction [kg m] (U4)."""
         return self.initial + sum(complex(self.changes[place][hole]) for place, hole in design)
@@ -142,8 +146,8 @@ class Plane:
     def clashes(self, place: int, other: int) -> Mask:
         """Return which holes of two places leave too little material between them, shape (holes, holes) (U5)."""
         chord = 2.0 * self.narrowest * abs(math.sin(0.5 * (self.angles[place] - self.angles[other])))
-        first, second = (np.array([hole.diameter for hole in self.holes[k]]) for k in (place, other))
-        clash: Mask = 0.5 * (first[:, None] + second) + self.wall > chord * (1.0 + 1e-12)
+        sums = self.diameters(place)[:, None] + self.diameters(other)
+        clash: Mask = 0.5 * sums + self.wall > chord * (1.0 + 1e-12)
         return clash
 
     def is_allowed(self, design: Design) -> bool:

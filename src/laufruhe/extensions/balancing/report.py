@@ -65,19 +65,23 @@ class Balanced:
                 yield result.plane, angle, hole
 
 
-def balanced(path: Path, out: Path | None, kinds: Sequence[str]) -> tuple[Output, Callable[[], str], bool]:
-    """Decide the holes of a file and write its results.
+def balanced(
+    path: Path, out: Path | None, kinds: Sequence[str], say: Callable[[str], None]
+) -> tuple[Output, Callable[[], str], bool]:
+    """Decide the holes of a file and write its results; `say` reports steps.
 
     Return a function that shows the report, one that returns JSON, and True if both residuals are permitted.
     """
+    say("reading the file")
     job = load_job(path)
     folder = out or Path("results") / f"{display_path(path).stem}-balance"
     option = "results" if out is None else "--out"
     with files.staged(files.FileSet(folder, option, "balance", NAMES)) as stage:
-        answer = None if job.correction is None else decide(job.correction)
+        answer = None if job.correction is None else decide(job.correction, say)
         pictures = {}
         if answer is not None:
             write_csv(_numbers(answer), stage / f"{HOLES}.csv")
+            say("drawing")
             pictures[PICTURE] = save_picture(picture(job, answer), stage / PICTURE, kinds)
         if (sheet := _card(job)) is not None:
             write_csv(sheet, stage / f"{CARD}.csv")
@@ -90,15 +94,13 @@ def balanced(path: Path, out: Path | None, kinds: Sequence[str]) -> tuple[Output
     return lambda stream: show_document(document, stream, folder, files.PAGE), lambda: text, is_met
 
 
-def decide(correction: Correction) -> Balanced:
+def decide(correction: Correction, say: Callable[[str], None] = lambda _: None) -> Balanced:
     """Return the holes of both planes; each plane is decided alone, because its holes change no other plane."""
-    return Balanced(
-        correction,
-        tuple(
-            correct(plane, correction.max_holes, correction.is_fewest, gap)
-            for plane, gap in zip(correction.planes, correction.gaps, strict=True)
-        ),
-    )
+    results = []
+    for plane, gap in zip(correction.planes, correction.gaps, strict=True):
+        say(f"deciding the holes of '{plane.name}'")
+        results.append(correct(plane, correction.max_holes, correction.is_fewest, gap))
+    return Balanced(correction, tuple(results))
 
 
 def report(job: Job, answer: Balanced | None, command: str) -> Document:

@@ -14,7 +14,6 @@ from scipy.spatial import cKDTree
 
 from laufruhe.extensions.balancing.physics import Design, Plane
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices, Mask
-from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.witness import check_bound, collected
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoundedParts, BranchAndBound, FathomedPart, OpenNode
 from laufruhe.prove.witness import Witness
@@ -59,14 +58,11 @@ class PlaneResult:
         Least residuals with 0, 1, 2 ... holes.
     best
         Index in `counts` of the selected design.
-    complete
-        True if no time limit ended the search.
     """
 
     plane: Plane
     counts: tuple[Count, ...]
     best: int
-    complete: bool
 
     @property
     def design(self) -> Design:
@@ -86,10 +82,9 @@ class PlaneResult:
     @property
     def is_fewest(self) -> bool:
         """True if fewer holes are proven to leave too much; if the residual is not met, any number of holes."""
-        if self.plane.permitted is None or not (self.is_met or self.complete):
-            return False
+        permitted = self.plane.permitted
         others = self.counts[: self.best] if self.is_met else self.counts
-        return all(count.bound > self.plane.permitted for count in others)
+        return permitted is not None and all(count.bound > permitted for count in others)
 
     @property
     def is_least(self) -> bool:
@@ -113,7 +108,7 @@ def correct(plane: Plane, max_holes: int, is_fewest: bool, gap: float) -> PlaneR
     gap
         Difference of two residuals that counts as none [kg m].
     """
-    counts, permitted, is_over = list[Count](), plane.permitted, False
+    counts, permitted = list[Count](), plane.permitted
     for holes in range(min(max_holes, len(plane.angles)) + 1):
         count = least_residual(plane, holes, gap, counts[-1].design if counts else ())
         if permitted is not None and count.proven and count.bound <= permitted < count.value:
@@ -123,13 +118,11 @@ def correct(plane: Plane, max_holes: int, is_fewest: bool, gap: float) -> PlaneR
         is_met = permitted is not None and count.value <= permitted
         if (is_fewest and is_met) or count.value <= gap:
             break
-        if is_over := is_time_over():
-            break
     values = [count.value for count in counts]
     met = [k for k, value in enumerate(values) if is_fewest and permitted is not None and value <= permitted]
     # fewer holes are preferred to a residual that is better by less than the gap
     best = (met or [k for k, value in enumerate(values) if value <= min(values) + gap])[0]
-    return PlaneResult(plane, tuple(counts), best, not is_over)
+    return PlaneResult(plane, tuple(counts), best)
 
 
 def least_residual(plane: Plane, holes: int, gap: float, start: Design | None = ()) -> Count:
@@ -254,8 +247,10 @@ def set_bounds(plane: Plane, sets: Indices, directions: ComplexArray = DIRECTION
     """
     towards = np.conj(directions)[:, None]
     hulls = np.array([(towards * changes).real.min(axis=1) for changes in plane.changes])
-    along = (towards[:, 0] * plane.initial).real
-    bounds: Array = (along + hulls[sets].sum(axis=1)).max(axis=1)
+    along = np.tile((towards[:, 0] * plane.initial).real, (len(sets), 1))
+    for column in sets.T:
+        along += hulls[column]
+    bounds: Array = along.max(axis=1)
     return bounds
 
 
@@ -292,10 +287,11 @@ def _compatible(plane: Plane, places: Places, left: Indices, right: Indices) -> 
     if not pairs:
         yield np.ones(len(left), dtype=bool), np.ones(len(right), dtype=bool)
         return
-    marks = np.concatenate([clash[left[:, i]] for i, _, clash in pairs], axis=1)
-    for mark in np.unique(marks, axis=0):
-        allowed, start = np.ones(len(right), dtype=bool), 0
-        for _, j, clash in pairs:
-            allowed &= ~mark[start : start + clash.shape[1]][right[:, j]]
-            start += clash.shape[1]
-        yield (marks == mark).all(axis=1), allowed
+    # clashes depend on diameters alone
+    marks = np.column_stack([plane.diameters(places[i])[left[:, i]] for i in sorted({i for i, _, _ in pairs})])
+    _, examples, classes = np.unique(marks, axis=0, return_index=True, return_inverse=True)
+    for k, example in enumerate(left[examples]):
+        allowed = np.ones(len(right), dtype=bool)
+        for i, j, clash in pairs:
+            allowed &= ~clash[example[i]][right[:, j]]
+        yield classes.ravel() == k, allowed
