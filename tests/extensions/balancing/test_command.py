@@ -101,6 +101,13 @@ def test_too_few_holes_have_status_one_and_the_best_design(folder: Path) -> None
     assert (folder / "results" / "disc-balance" / "holes.csv").exists()
 
 
+def test_a_rotor_within_its_grade_needs_no_hole(folder: Path) -> None:
+    (folder / "disc.toml").write_text(JOB.replace('"20 g mm"', '"401 g mm"'), encoding="utf-8")
+    result = run("disc.toml")
+    assert result.exit_code == 0
+    assert "No hole is needed: the unbalance of both planes is permitted." in result.stdout
+
+
 PLANE = "correction.planes[1]"
 
 

@@ -130,12 +130,15 @@ def _blocks(job: Job, answer: Balanced | None, command: str) -> Iterator[Block]:
 
 def headline(answer: Balanced) -> str:
     """Return the result in a sentence."""
-    count = counted(sum(len(result.design) for result in answer.planes), "hole")
+    holes, is_fewest = sum(len(result.design) for result in answer.planes), answer.correction.is_fewest
+    if answer.is_met and is_fewest and not holes:
+        return "No hole is needed: the unbalance of both planes is permitted."
     if answer.is_met:
-        goal = "the fewest" if answer.correction.is_fewest else "the least residual"
-        is_proven = all(r.is_fewest if answer.correction.is_fewest else r.is_least for r in answer.planes)
-        proof = "proven" if is_proven else "not proven"
-        return f"{count[:1].upper()}{count[1:]} correct both planes: {goal} ({proof})."
+        verb = "corrects" if holes == 1 else "correct"
+        goal = "the fewest" if is_fewest else "the least residual"
+        is_proven = all(result.is_fewest if is_fewest else result.is_least for result in answer.planes)
+        proof = "(proven)" if is_proven else "that was found (not proven)"
+        return f"{counted(holes, 'hole')} {verb} both planes: {goal} {proof}."
     names = " and ".join(f"'{r.plane.name}'" for r in answer.planes if not r.is_met)
     is_proven = all(r.is_fewest for r in answer.planes if not r.is_met)
     what = "is proven to correct" if is_proven else "was found that corrects"
