@@ -641,7 +641,7 @@ class EngineParts(Parts):
         goal: Literal["fewest holes", "least residual"] | None = None,
         direction: Literal["axial", "radial"] | None = None, point_angle: Number | None = None,
         min_depth: Number | None = None, wall: Number | None = None, max_holes: int | None = None,
-        slugs: Table | None = None, residual_unbalance: str | None = None, rotor_mass: Number | None = None,
+        slugs: Table | None = None, permitted_unbalance: str | None = None, rotor_mass: Number | None = None,
         service_speed: Number | None = None, centre_of_mass: Number | None = None, zero_mark: Number | None = None,
         machine_counts: Literal["with rotation", "against rotation"] | None = None,
     ) -> Self:
@@ -675,7 +675,7 @@ class EngineParts(Parts):
             Largest number of holes in a plane.
         slugs
             Slugs of heavy metal, which fill holes of their diameter.
-        residual_unbalance
+        permitted_unbalance
             Permitted in each plane: an unbalance, or the share of a plane in a grade of ISO 21940-11.
         rotor_mass
             Mass of the rotor that has the grade [kg].

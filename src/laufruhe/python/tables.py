@@ -511,7 +511,7 @@ def plane(
     name: str, *, measured: Table, radius: Value, x: Value | None = None, angles: Values | None = None,
     places: int | None = None, first_place: Value | None = None, allowed: Sequence[Values] | Array | None = None,
     solid: Sequence[Values] | Array | None = None, max_depth: Value | None = None,
-    residual_unbalance: Value | None = None,
+    permitted_unbalance: Value | None = None,
 ) -> Table:
     """Return a table `plane`.
 
@@ -540,7 +540,7 @@ def plane(
         Sectors that no hole may touch [rad].
     max_depth
         Largest depth in this plane, in place of that of all [m].
-    residual_unbalance
+    permitted_unbalance
         Permitted residual unbalance of this plane [kg m].
     """
     return keys_of(locals())

@@ -162,7 +162,7 @@ def random_file(seed: int, max_holes: int = 3) -> Tables:
             {"unbalance": f"{size:.2f} g mm", "angle": angle} if draw.random() < 0.5
             else {"mass": f"{size / radius:.4f} g", "radius": f"{radius} mm", "angle": angle}
         )  # fmt: skip
-        plane["residual_unbalance"] = f"{draw.choice([5, 20, 60, 150])} g mm"
+        plane["permitted_unbalance"] = f"{draw.choice([5, 20, 60, 150])} g mm"
         job["planes"].append(plane)
     return {"title": f"random correction {seed}", "correction": job}
 

@@ -21,7 +21,7 @@ drills = ["8 mm", "10 mm"]
 depth_step = "1 mm"
 max_depth = "12 mm"
 wall = "2 mm"
-residual_unbalance = "20 g mm"
+permitted_unbalance = "20 g mm"
 zero_mark = 30
 machine_counts = "against rotation"
 [[correction.planes]]
@@ -123,9 +123,9 @@ PLANE = "correction.planes[1]"
         ("places = 12", "places = 12\nsolid = [[0, 360]]", f"{PLANE}.allowed: and solid leave no place"),
         ('"right"', '"left"', "two planes have this name"),
         ('"20 g mm"', '"G 6.3"', "correction.rotor_mass: is missing, and a balance grade needs it"),
-        ('"20 g mm"', '"fine"', 'residual_unbalance = "fine": is neither a balance grade nor an unbalance'),
+        ('"20 g mm"', '"fine"', 'permitted_unbalance = "fine": is neither a balance grade nor an unbalance'),
         ('"20 g mm"', '"0 g mm"', "must be more than 0"),
-        ('residual_unbalance = "20 g mm"', "", "is missing, and decides how many holes are enough"),
+        ('permitted_unbalance = "20 g mm"', "", "is missing, and decides how many holes are enough"),
         ('"20 g mm"', '"20 g mm"\nservice_speed = "900 rpm"', "correction.service_speed: needs a balance grade"),
         ('"20 g mm"', '"G 6.3"\nservice_speed = "900 rpm"\nrotor_mass = "9 kg"\ncentre_of_mass = "0 mm"',
          'centre_of_mass = "0 mm": must be between the places x of the two planes'),

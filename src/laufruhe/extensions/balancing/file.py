@@ -80,7 +80,7 @@ class PlaneTable(Table):
     )  # fmt: skip
     solid: list[Sector] = Field(default_factory=list, description="Sectors that no hole may touch.")
     max_depth: f.PositiveLength | None = f.optional("Largest depth in this plane, in place of that of all.")
-    residual_unbalance: f.Unbalance | None = f.optional("Permitted residual unbalance of this plane.")
+    permitted_unbalance: f.Unbalance | None = f.optional("Permitted residual unbalance of this plane.")
 
 
 class SlugsTable(Table):
@@ -113,7 +113,7 @@ class CorrectionTable(Table):
     wall: f.NonNegativeLength = f.optional("Least material between two holes, and to the edge of a sector.", 0.0)
     max_holes: int = Field(default=4, ge=1, le=MAX_HOLES, description="Largest number of holes in a plane.")
     slugs: SlugsTable | None = None
-    residual_unbalance: str | None = Field(
+    permitted_unbalance: str | None = Field(
         default=None, description="Permitted in each plane: an unbalance, or the share of a plane in a grade of "
         "ISO 21940-11.", examples=["G 6.3", "50 g mm"],
     )  # fmt: skip
@@ -253,12 +253,12 @@ def correction_of(table: CorrectionTable, tolerance: float) -> Correction:
     dial = Dial(table.zero_mark, 1.0 if table.machine_counts == "with rotation" else -1.0)
     permitted, rule = _permitted(table)
     planes = tuple(
-        _plane(table, k, _smaller(permitted[k], table.planes[k].residual_unbalance), drilling, dial) for k in range(2)
+        _plane(table, k, _smaller(permitted[k], table.planes[k].permitted_unbalance), drilling, dial) for k in range(2)
     )
     if table.goal == "fewest holes" and any(plane.permitted is None for plane in planes):
-        remedy = 'write for example residual_unbalance = "G 6.3", or goal = "least residual"'
+        remedy = 'write for example permitted_unbalance = "G 6.3", or goal = "least residual"'
         raise Refused(
-            "correction.residual_unbalance", None, "is missing, and decides how many holes are enough", remedy
+            "correction.permitted_unbalance", None, "is missing, and decides how many holes are enough", remedy
         )
     gaps = tuple(tolerance * (abs(plane.initial) if plane.permitted is None else plane.permitted) for plane in planes)
     return Correction(planes, drilling, dial, table.goal == "fewest holes", table.max_holes, gaps, rule)
@@ -270,12 +270,12 @@ def _smaller(first: float | None, second: float | None) -> float | None:
 
 def _permitted(table: CorrectionTable) -> tuple[tuple[float | None, ...], str]:
     """Return the permitted residual of each plane [kg m], and the rule in words."""
-    text, where = table.residual_unbalance, "correction.residual_unbalance"
+    text, where = table.permitted_unbalance, "correction.permitted_unbalance"
     grade = None if text is None else grade_of(text)
     for key in ("rotor_mass", "service_speed", "centre_of_mass"):
         is_given = getattr(table, key) is not None
         if is_given and grade is None:
-            raise Refused(f"correction.{key}", None, "needs a balance grade", 'add residual_unbalance = "G 6.3"')
+            raise Refused(f"correction.{key}", None, "needs a balance grade", 'add permitted_unbalance = "G 6.3"')
         if not is_given and grade is not None and key != "centre_of_mass":
             raise Refused(f"correction.{key}", None, "is missing, and a balance grade needs it", "add it")
     if text is None:
