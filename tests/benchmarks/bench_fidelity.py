@@ -207,7 +207,7 @@ def growth() -> tuple[list[str], list[tuple[str, Sequence[int], list[float], flo
 def draw(found: list[tuple[str, Sequence[int], list[float], float]], path: Path) -> None:
     """Four lines on one panel, sizes over the smallest of each."""
     style = importlib.import_module("laufruhe.plots.style")
-    from matplotlib.ticker import FuncFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator
 
     drawn = style.page(1, 1, (6.4, 3.8))
     axes = drawn.panels[0]
@@ -217,6 +217,7 @@ def draw(found: list[tuple[str, Sequence[int], list[float], float]], path: Path)
                       textcoords="offset points", va="center", fontsize=8, color=colour)  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="size over the smallest", ylabel="one evaluation [ms]")
     axes.set_xlim(0.9, 160.0)
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
     plain = FuncFormatter(lambda value, _: f"{value:g}")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter(plain)
