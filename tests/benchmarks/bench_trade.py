@@ -47,8 +47,9 @@ def draw(trades: list[dict[str, Any]]) -> None:
     style = importlib.import_module("laufruhe.plots.style")
     drawn = style.page(1, 2, (3.5, 3.6), across=0.3)
     rows = [row for trade in trades for row in trade["rows"]]
+    shown = [name for name in SHOWN if any(row["name"] == name for row in rows)]
     for axes, key, name in zip(drawn.panels, ("error", "regret"), ("error of the objective", "regret"), strict=True):
-        for k, fidelity in enumerate(SHOWN):
+        for k, fidelity in enumerate(shown):
             own = [row for row in rows if row["name"] == fidelity and row[key] is not None]
             broken = [row for row in own if key == "regret" and row["excess"] > KEEPS]
             values = np.sort([max(row[key], LEAST) for row in own if row not in broken])
@@ -61,12 +62,12 @@ def draw(trades: list[dict[str, Any]]) -> None:
                 axes.annotate(
                     f"x {len(broken)}", (BEYOND, k), va="center", ha="center", fontsize=8, backgroundcolor="white"
                 )
-        axes.set(xscale="log", xlabel=name, yticks=range(len(SHOWN)), ylim=(len(SHOWN) - 0.5, -0.5))
+        axes.set(xscale="log", xlabel=name, yticks=range(len(shown)), ylim=(len(shown) - 0.5, -0.5))
         axes.set_xlim(0.5 * LEAST, 60.0)
         axes.set_xticks([10.0**power for power in range(-8, 2, 2)])
         axes.set_xticklabels(["under 1e-8", "1e-6", "1e-4", "1 %", "100 %"])
         axes.minorticks_off()
-    drawn.panels[0].set_yticklabels(SHOWN)
+    drawn.panels[0].set_yticklabels(shown)
     drawn.panels[1].set_yticklabels([])
     text = (
         f"A dot: one of {len(trades)} ready problems; a bar: the middle of them. "

@@ -205,7 +205,7 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
     regrets = sorted(row.regret for row in rows if row.decides and not math.isnan(row.regret))
     broken = sum(row.violation > KEEPS for row in rows)
     if not errors:
-        return f"{what} nothing in these problems."
+        return f"{what} nothing here: no problem has this fidelity."
     text = f"{what} {_up_to(errors[-1])} of the value{_median(errors)}"
     if regrets:
         text += f"; the design that it finds is worse than the best by {_up_to(regrets[-1])}{_median(regrets)}"
