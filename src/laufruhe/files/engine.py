@@ -198,6 +198,10 @@ class EngineTable(Table):
         "centre after the one before."
     )
     fires_together: bool = f.optional("Whether cylinders are meant to fire at once; else you are asked.", False)
+    gravity: bool = f.optional(
+        "true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.",
+        False,
+    )
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
     single_cylinders: list[SingleCylinderTable] = Field(default_factory=list)

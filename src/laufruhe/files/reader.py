@@ -139,6 +139,8 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     if file.geared_inertias and file.engine.throws is not None and file.engine.listed_throws is None:
         rule = "need fixed throws, but engine.throws is open"
         raise Refused("geared_inertias", None, rule, "fix the throws, or remove [[geared_inertias]]")
+    if file.engine.gravity:
+        _check_gravity(file)
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
     if isinstance(file.gas, TraceTable) and file.gas.cylinder_angles == "common":
@@ -146,6 +148,18 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
         raise Refused("gas.cylinder_angles", "common", rule, "count each column from the firing of its cylinder")
     closed = partial(_assembled, file, path=path)
     return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
+
+
+def _check_gravity(file: ProblemFile) -> None:
+    # what is not modelled together with the weight of moving parts (T14)
+    reasons = {
+        "an open crank": file.phasing is not None or is_open(file.engine, file.balancer_shafts),
+        "[[geared_inertias]]": bool(file.geared_inertias),
+        "fidelity.crank_inertia": file.fidelity.value_of("crank_inertia") is not None,
+    }
+    for what, is_present in reasons.items():
+        if is_present:
+            raise Refused("engine.gravity", True, f"is not modelled together with {what}", "leave one of the two out")
 
 
 class FileOrigin(Origin):
@@ -287,7 +301,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     engine = Engine(
         file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, bearings, wheel,
         geared, load_cases_of(file.load_cases, on_mounts.block),
-        load_torque=load_torque_of(file.load_torque, path.parent, cycle),
+        load_torque=load_torque_of(file.load_torque, path.parent, cycle), gravity=table.gravity,
     )  # fmt: skip
     load_said = [f"Load: {sentence}" for sentence in engine.load_torque.recording] if engine.load_torque else []
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)

@@ -95,6 +95,8 @@ class Engine:
         Parts that extensions add, one of a class.
     load_torque
         Torque of the driven machine over the crank angle; None if it is constant.
+    gravity
+        True if the weight of moving parts acts on the crank (T14).
     """
 
     name: str
@@ -109,6 +111,7 @@ class Engine:
     load_cases: tuple[LoadCase, ...] = ()
     extras: tuple[Extra, ...] = ()
     load_torque: LoadTorque | None = None
+    gravity: bool = False
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings", "geared"):

@@ -28,6 +28,7 @@ from laufruhe.numerics.roots import rising_root
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.gravity import with_gravity
 from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, reduced, resolved_orders, two_order_roll
 from laufruhe.physics.rigid_body import ROLL
@@ -61,18 +62,19 @@ class TorqueFacts:
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
     """Return the torque of gas, of pistons and rods as point masses, of the rods' inertia, and of all (T1).
 
-    A load that is not constant comes last (T12).
+    The weights of moving parts (T14) and a load that is not constant (T12) come last if they count.
     """
     total, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
     masses = crank_torque(engine, still, fidelity)
     points = crank_torque(engine, still, replace(fidelity, rod="mass-only"))
     gas, rods = total + masses.mapped(np.negative), masses + points.mapped(np.negative)
     parts = {"gas": gas, "pistons": points, "rods": rods, "all": total}
+    mean = Spectrum(total.base, total.coefficients[:1])
+    zero = mean.mapped(lambda values: 0.0 * values)
+    if engine.gravity:
+        parts["weights"] = with_gravity(zero, engine, fidelity)
     if engine.load_torque is not None:
-        mean = Spectrum(total.base, total.coefficients[:1])
-        parts["load"] = mean + less_load(Spectrum(total.base, 0.0 * mean.coefficients), engine, fidelity).mapped(
-            np.negative
-        )
+        parts["load"] = mean + less_load(zero, engine, fidelity).mapped(np.negative)
     return parts
 
 
@@ -101,8 +103,8 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 
 def excess_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the torque of the crank less the alternating torque of the load, shape (n,) [N m] (T12)."""
-    return less_load(crank_torque(engine, point, fidelity), engine, fidelity)
+    """Return the torque of crank and weights less the alternating torque of the load, (n,) [N m] (T12, T14)."""
+    return with_gravity(less_load(crank_torque(engine, point, fidelity), engine, fidelity), engine, fidelity)
 
 
 def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
@@ -233,8 +235,9 @@ class Swing:
 
 
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:
-    """Return work and inertia over the cycle; rotors, mounts and flywheel are not part of them."""
-    bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None, extras=(), geared=())
+    """Return work and inertia over the cycle; mounts and flywheel are not part of them, rotors by their weight only."""
+    rotors = engine.rotors if engine.gravity else ()
+    bare = replace(engine, rotors=rotors, mounts=(), bearings=(), flywheel=None, extras=(), geared=())
     return _compute_swing(bare, point, fidelity)
 
 

@@ -22,6 +22,7 @@ from laufruhe.numerics.spectrum import Spectrum, spectrum_of, spectrum_with_kink
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_factor
+from laufruhe.physics.gravity import with_gravity
 from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.mechanism import cylinder_wrench, reduced
 from laufruhe.physics.rigid_body import ROLL, plane_wrench
@@ -159,8 +160,8 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
 
 
 def driving_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the torque of the gas less the alternating torque of the load over the crank angle [N m] (T12)."""
-    return less_load(gas_torque(engine, point, fidelity), engine, fidelity)
+    """Return the torque of gas and weights less the alternating torque of the load [N m] (T12, T14)."""
+    return with_gravity(less_load(gas_torque(engine, point, fidelity), engine, fidelity), engine, fidelity)
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from enum import StrEnum
 from laufruhe.errors import ModelError
 from laufruhe.extension import extensions, objects
 from laufruhe.physics.fidelity import EXACT
-from laufruhe.problem.channels import CHANNELS, Channel
+from laufruhe.problem.channels import CHANNELS, IRREGULARITY, STORED_WORK, Channel
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.problem import Problem
 
@@ -130,6 +130,8 @@ _OF_BEARINGS = frozenset(
     name for name, row in TABLE.items()
     if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.KINKED)
 )  # fmt: skip
+# dependences on unbalances if the weight of moving parts counts (T14)
+_OF_GRAVITY = {STORED_WORK.name: Dependence.AFFINE, IRREGULARITY.name: Dependence.SMOOTH}
 # dependences that are lost at an uneven speed, where loads of parts do not add up
 _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
@@ -140,6 +142,8 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     if CHANNELS.get(channel.name) is not channel:
         return Dependence.UNKNOWN
     entry = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)
+    if problem.engine.gravity and kind is Kind.UNBALANCE and channel.name in _OF_GRAVITY:
+        return _OF_GRAVITY[channel.name]
     if entry in (Dependence.NONE, Dependence.UNKNOWN):
         return entry
     if kind is Kind.PLACE and channel.name in _OF_BEARINGS and not _moves_carried(problem):

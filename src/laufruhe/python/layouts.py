@@ -22,7 +22,7 @@ def inline(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
@@ -71,6 +71,8 @@ def inline(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
@@ -111,7 +113,7 @@ def vee(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
@@ -162,6 +164,8 @@ def vee(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
@@ -210,7 +214,7 @@ def boxer(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     cylinder_spacing: Value | Values | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
@@ -260,6 +264,8 @@ def boxer(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
@@ -301,7 +307,7 @@ def opposed_piston(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
@@ -352,6 +358,8 @@ def opposed_piston(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
@@ -402,10 +410,11 @@ def delta(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, fires_together: bool | None = None,
-    single_cylinders: Sequence[Table] | None = None, cylinder_spacing: Value | Values | None = None,
-    crank_distance: Value | None = None, reversed_crank: int | None = None, crank_leads: Values | None = None,
-    pivot_distance: Value | None = None, return_ratio: Value | None = None, lever_length: Value | None = None,
-    lever: Table | None = None, lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
+    gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    cylinder_spacing: Value | Values | None = None, crank_distance: Value | None = None,
+    reversed_crank: int | None = None, crank_leads: Values | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout delta.
 
@@ -445,6 +454,8 @@ def delta(
         Numbers of the cylinders in the order in which they fire, or "open".
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
@@ -479,7 +490,7 @@ def radial(
     offset: Value | None = None, reciprocating_mass: Value | None = None, rotating_mass: Value | None = None,
     rod: Table | None = None, big_end: Table | None = None, rod_inertia_deficit: Value | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None, knuckle_radius: Value | None = None,
     master_cylinder: int | None = None, knuckle_angles: Values | None = None,
@@ -527,6 +538,8 @@ def radial(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     numbering
@@ -571,7 +584,7 @@ def x_engine(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     cylinder_spacing: Value | Values | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
@@ -620,6 +633,8 @@ def x_engine(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
@@ -657,7 +672,7 @@ def parts(
     offset: Value | None = None, reciprocating_mass: Value | None = None, rotating_mass: Value | None = None,
     rod: Table | None = None, big_end: Table | None = None, rod_inertia_deficit: Value | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, shafts: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, shafts: Sequence[Table] | None = None,
     slider_cranks: Sequence[Table] | None = None, single_cylinders: Sequence[Table] | None = None,
     pivot_distance: Value | None = None, return_ratio: Value | None = None, lever_length: Value | None = None,
     lever: Table | None = None, lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
@@ -701,6 +716,8 @@ def parts(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     shafts
         Crankshafts of a free list of parts.
     slider_cranks
@@ -729,7 +746,7 @@ def rotary(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, single_cylinders: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, single_cylinders: Sequence[Table] | None = None,
     cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
     rotation: Literal["clockwise", "counter-clockwise"] | None = None,
@@ -760,6 +777,8 @@ def rotary(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     single_cylinders
         Cylinders that differ from the others; missing keys are those of [engine].
     cylinder_spacing
@@ -800,7 +819,7 @@ def engine(
     throws: Values | Literal["open", "parallel-360", "parallel-180", "parallel-270", "even-three", "t-plane",
         "flat-plane", "cross-plane", "even-six"] | None = None,
     firing_order: Sequence[int] | Literal["open"] | None = None, firing_intervals: Values | None = None,
-    fires_together: bool | None = None, shafts: Sequence[Table] | None = None,
+    fires_together: bool | None = None, gravity: bool | None = None, shafts: Sequence[Table] | None = None,
     slider_cranks: Sequence[Table] | None = None, single_cylinders: Sequence[Table] | None = None,
     cylinder_spacing: Value | Values | None = None, row_angle: Value | None = None,
     numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
@@ -861,6 +880,8 @@ def engine(
         centre after the one before [rad].
     fires_together
         Whether cylinders are meant to fire at once; else you are asked.
+    gravity
+        true: the weight of moving parts acts on the crank, with z upwards; stored work and irregularity count it.
     shafts
         Crankshafts of a free list of parts.
     slider_cranks

@@ -14,7 +14,20 @@ from matplotlib.ticker import MultipleLocator
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.torque import TorqueFacts, excess_torque, swing_of, torque_facts, torque_parts, turning_inertia
-from laufruhe.plots.style import GREEN, ORANGE, PALE, PURPLE, SKY, Series, entry, finish_page, page, series_of, styled
+from laufruhe.plots.style import (
+    GREEN,
+    ORANGE,
+    PALE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    Series,
+    entry,
+    finish_page,
+    page,
+    series_of,
+    styled,
+)
 from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
 from laufruhe.present.measures import has_loads, uses_torque
 from laufruhe.present.numbers import RPM, number
@@ -23,7 +36,7 @@ from laufruhe.solvers.result import Result
 Unit: TypeAlias = tuple[float, str]
 STEPS, MAX_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
-COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK, "load": PURPLE}
+COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK, "load": PURPLE, "weights": VERMILION}
 # smallest drawn part, and smallest drawn order, relative to the largest
 MIN_PART, MIN_ORDER = 1e-3, 1e-2
 _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}
