@@ -15,7 +15,14 @@ from laufruhe.physics.mount_numbers import total_stiffness
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.mounts.convex import ConvexDuals, convex_program, dual_bound, is_convex, solve_convex_mounts
+from laufruhe.solvers.mounts.convex import (
+    ConvexDuals,
+    _residual,
+    convex_program,
+    dual_bound,
+    is_convex,
+    solve_convex_mounts,
+)
 from laufruhe.solvers.mounts.nonlinear import solve_mounts
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
@@ -43,6 +50,18 @@ def test_shadow_price_of_a_frequency_is_the_slope_of_the_sag(tmp_path):
     moved = replace(problem, limits=(replace(limit, maximum=limit.maximum + step),))
     further = solve_mounts(moved).objective.value
     assert (solve_mounts(problem).objective.value - further) / step == pytest.approx(price, rel=2e-2)
+
+
+def test_a_residual_is_small_at_the_optimum_and_the_largest_excess_of_a_design_without_prices(tmp_path):
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
+    program, result = convex_program(problem), solve_convex_mounts(problem)
+    assert result.limits[0].active
+    assert result.certificate.kkt_residual < 1e-5
+    nothing = ConvexDuals.none(program)
+    stiffest = program.upper
+    excess = [limit.function.value(stiffest) / limit.maximum - 1.0 for limit in program.limits]
+    assert _residual(program, stiffest, nothing, 0.0 * stiffest) == pytest.approx(max(excess), rel=1e-12)
+    assert max(excess) > 0.1
 
 
 def least_squares(tmp_path):

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,8 @@ from laufruhe.report.sections.values import attainable as attainable_tables
 from laufruhe.report.wording import attainable, explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.accuracy import objective_error
-from laufruhe.solvers.attainable_limits import LONG, with_attainable_limits
+from laufruhe.solvers.attainable_limits import CLOSE, LONG, _bisect, with_attainable_limits
+from laufruhe.solvers.values import AttainableLimit
 from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design, infeasible_result
 from laufruhe.solvers.result import Result, Status
 
@@ -327,3 +329,19 @@ def test_a_design_that_breaks_a_limit_proves_nothing() -> None:
     assert result.certificate.lower_bound == shown.bound
     assert "No design within the bounds and limits has less than" in explained(result)
     assert "so it has no proof" in explained(result)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_an_edge_is_halved_to_the_same_share_in_every_unit(unit: float) -> None:
+    problem, edge = problem_of([LIGHT, QUIET]), 1.37 * unit
+    own = replace(problem.limits[1], maximum=unit)
+
+    def known(asked: Problem) -> Any:
+        maximum = min((limit.maximum for limit in asked.limits if limit.measure == own.measure), default=2.0 * unit)
+        status = Status.FEASIBLE if maximum >= edge else Status.INFEASIBLE
+        return SimpleNamespace(status=status, final=SimpleNamespace(values=lambda _: (maximum,)), decisions=())
+
+    entry = AttainableLimit("quiet", "at most", unit, "N")
+    told = _bisect(entry, own, problem, problem.limits[:1], Status.INFEASIBLE, known).attainable
+    assert told.bound < edge <= told.value
+    assert told.value - told.bound <= CLOSE * unit

@@ -6,6 +6,7 @@ counter shaft that share the first order between them.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.sections import tables_of
 from laufruhe.solvers import solve
+from laufruhe.solvers.lexicographic import solve_lexicographic
 from laufruhe.solvers.result import Status
 from laufruhe.studies.trade import trade
 from problem_files import changed, loaded
@@ -147,6 +149,14 @@ def test_an_order_of_one_is_that_objective(tmp_path: Path) -> None:
     plain = solve(loaded(tmp_path, SCENE + '[objective]\nminimise = "rms shaking force"\n'))
     assert one.ranks == ()
     assert one.objective == plain.objective
+
+
+def test_a_rank_without_a_proof_has_no_bound(tmp_path: Path) -> None:
+    found = solve_lexicographic(loaded(tmp_path, TWO), lambda stage: replace(solve(stage), certificate=None))
+    assert len(found.ranks) == 2
+    for rank in found.ranks:
+        assert (rank.lower_bound, rank.proof) == (0.0, Proof.NONE)
+        assert rank.gap == np.inf
 
 
 def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None:

@@ -99,6 +99,18 @@ SCENES: dict[str, Callable[[int], AffineProblem]] = {
 }
 
 
+@pytest.mark.parametrize("unit", [1e-12, 1e12])
+def test_the_optimum_is_the_same_in_every_unit_of_the_load(unit: float) -> None:
+    problem = scene(4)
+    terms = tuple(
+        (weight, replace(norm, constant=unit * norm.constant, slope=unit * norm.slope)) for weight, norm in problem.terms
+    )
+    own, other = newton_solution(problem), newton_solution(replace(problem, terms=terms))
+    assert own is not None
+    assert other is not None
+    assert other[0] == pytest.approx(own[0], rel=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("kind", SCENES)
 def test_it_proves_the_optimum_of_the_cones(kind: str, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:

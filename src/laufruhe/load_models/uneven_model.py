@@ -145,7 +145,7 @@ class UnevenModel:
         if isinstance(measure.channel, LoadChannel) and measure.channel.part is not None:
             return [counted.mapped(np.eye(6)[measure.channel.part])]
         by_order = [self._maps(measure, float(h), point) for h in counted.orders]
-        return [counted.map_orders([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
+        return [counted.map_orders(maps) for maps in zip(*by_order, strict=True)]
 
     def _turned(
         self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum], selections: Sequence[OrderSelection],

@@ -68,3 +68,27 @@ def test_a_box_without_anything_possible_is_empty() -> None:
     assert kept is not None
     # the sine of twice the angle holds what is across
     assert kept[2, 1] <= 0.5 * 199.0 * math.sin(0.4) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_whole_box_is_reached_and_is_the_same_in_every_unit(seed: int) -> None:
+    """Every end by some stiffnesses and angle; what is kept of a box of N/m is what is kept of one of MN/m."""
+    generator, unit, kept = np.random.default_rng(seed), 1e-6, 0
+    for plane in planes(generator, 20):
+        whole = plane.full_box
+        ends = np.stack(np.meshgrid(*zip(plane.low, plane.high, strict=True)), axis=-1).reshape(-1, 2)
+        angles = np.linspace(*plane.angles, 4001)
+        c, s = np.cos(2.0 * angles), np.sin(2.0 * angles)
+        p, d = (0.5 * (ends[:, :1] + sign * ends[:, 1:]) for sign in (1.0, -1.0))
+        reached = [np.array([entry.min(), entry.max()]) for entry in (p + d * c, p - d * c, d * s)]
+        assert whole == pytest.approx(np.array(reached), abs=1e-5 * float(plane.high.max()))
+        scaled = PlaneStiffness(unit * plane.low, unit * plane.high, plane.angles, unit * plane.reference)
+        for width in (0.5, 0.1):
+            middle, half = generator.uniform(whole[:, 0], whole[:, 1]), 0.5 * width * (whole[:, 1] - whole[:, 0])
+            box = np.stack([middle - half, middle + half], axis=1)
+            found, other = plane.contracted(box), scaled.contracted(unit * box)
+            assert (found is None) == (other is None)
+            if found is not None:
+                kept += 1
+                assert other == pytest.approx(unit * found, rel=1e-9, abs=1e-9 * unit)
+    assert kept > 3

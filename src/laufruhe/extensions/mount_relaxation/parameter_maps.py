@@ -417,7 +417,7 @@ class PlaneStiffness:
         for _ in range(ROUNDS):
             along_range, across_range, slope = self._polar(part)
             minimum = max(across_range[0], -across_range[1], 0.0)
-            if minimum - rounding > slope * max(-along_range[0], along_range[1], 0.0):
+            if minimum - rounding > slope * max(-along_range[0], along_range[1]):
                 return None
             low, high = self.stiffness_range(part)
             # the trace lies between the sums of the ranges

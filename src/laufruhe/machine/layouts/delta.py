@@ -113,8 +113,7 @@ class Delta(LayoutKind):
         # the least lead that all banks may share is 20 deg with one crank reversed, and 60 deg with none (K18)
         first, second = map(as_turn, leads) if leads is not None else (-Fraction(sum(ratios), 18),) * 2
         # the lead of the third bank closes the angles round the triangle (K18)
-        half = Fraction(1, 2)
-        third = reduced_turn(-Fraction(sum(ratios), 6) - first - second + half, 1) - half
+        third = -Fraction(sum(ratios), 6) - first - second
         return Triangle(inputs.crank_distance, ratios, (first, second, third))
 
     def parts(
