@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from laufruhe.load_models.star_model import StarNorm
+from laufruhe.load_models.star_model import StarNorm, compress_rows
 from laufruhe.numerics.norms import NORMS, Grid
 
 
@@ -22,3 +22,16 @@ def test_roundings_of_what_cancels_are_nothing_and_small_rows_stay() -> None:
         assert not told[:, 0].any()
         assert np.allclose(np.abs(told[:, 1]), 1e-12, rtol=1e-3, atol=0.0)
     assert np.array_equal(norm.at([0, 0]).constant, constant)
+
+
+def test_fewer_rows_have_the_length_of_all() -> None:
+    """Of any sum of three arrays; nothing is compressed where the rows are no more than the arrays."""
+    r = np.random.default_rng(3)
+    parts = [r.normal(size=(40, 2)), r.normal(size=(2, 3, 40, 2))]
+    found = compress_rows(parts)
+    assert found is not None
+    assert found[0].shape == (7, 1)
+    for weights in r.normal(size=(5, 2, 3)):
+        whole, few = (a + np.einsum("ij,ijkd->kd", weights, b) for a, b in (parts, found))
+        assert np.isclose(np.linalg.norm(whole), np.linalg.norm(few), rtol=1e-12)
+    assert compress_rows([r.normal(size=(3, 2)), r.normal(size=(5, 3, 2))]) is None

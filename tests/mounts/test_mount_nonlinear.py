@@ -25,7 +25,7 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import evaluate_design
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.mounts.bounds import bound_search
-from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_mounts
+from laufruhe.solvers.mounts.nonlinear import _method, _rebalanced, mounts_bound, solve_joint, solve_mounts
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.result import Status
@@ -77,7 +77,10 @@ def at(joint: SmoothProgram, point, softness: float = 1e-9):
 
 @pytest.mark.parametrize("measure", ["mean", "maximum", "rms"])
 def test_the_program_says_what_the_exact_model_says(measure, tmp_path):
-    problem = joint_problem(tmp_path, measure)
+    plain = joint_problem(tmp_path, measure)
+    # weights of points are relative
+    slow = replace(plain.points[0], name="slow", speed=0.8 * plain.points[0].speed, weight=3.0)
+    problem = replace(plain, points=(*plain.points, slow))
     joint = SmoothProgram(problem, objective_value(problem, evaluate(problem)))
     generator = np.random.default_rng(2)
     for _ in range(3):
@@ -442,3 +445,44 @@ def test_what_nothing_open_moves_is_a_number_of_the_program(tmp_path):
     own = 2.0 * evaluate(alone).value(roll.measure)
     assert own > 0.0
     assert at(mixed, start)[0] == pytest.approx(at(plain, start)[0] + own, rel=1e-9)
+
+
+def test_a_limit_that_turns_out_to_hold_is_searched_with(tmp_path):
+    """A limit that was left out returns as a row once a good design is at it, and the search is repeated."""
+    limit = '[[constraints]]\nlimit = "rms mount force"\nmax = "1 N"\n'
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limit, SEARCH)
+    value = evaluate(problem).value(problem.limits[0].measure)
+    for room, holds in ((0.02, True), (0.3, False)):
+        held = replace(problem.limits[0], maximum=value / (1.0 - room))
+        search = MountSearch(replace(problem, limits=(held,)), evaluate(problem))
+        search._ignored, rows, none = {held}, [], np.zeros(0)
+        place = search.joint.start([d.start for d in problem.mount_decisions], none)
+        end = LocalOptimum(place, 1.0, none, none, 0.0, 0.0, 1, 0.0, Ending.CONVERGED, 0)
+
+        def look(search=search, rows=rows, end=end):
+            rows.append(held.name in search._program().program.constraint_names)
+            search._evaluate_optima([end])
+
+        search._repeat_with_active_limits(look)
+        assert rows == ([False, True] if holds else [False])
+
+
+def test_unbalances_on_the_mounts_of_a_design_become_the_best_of_these_mounts(tmp_path):
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SHAFTS, FORCE.format(measure="rms"))
+    poor = evaluate_design(problem, problem.start)
+    found, gap = _rebalanced(SearchResult(poor, MountSearch(problem, evaluate(problem)).joint))
+    held = replace(problem, engine=problem.design([d.start for d in problem.mount_decisions], problem.mount_decisions))
+    best = solve_unbalances(replace(held, decisions=problem.unbalances)).objective.value
+    assert gap <= problem.tolerance
+    assert found.design.value == pytest.approx(best, rel=1e-6)
+    assert found.design.value < 0.9 * poor.value
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0])
+def test_how_far_ends_are_from_each_other_is_told_in_every_unit(unit):
+    none = np.zeros(0)
+    ends = [
+        LocalOptimum(np.array([value]), unit * value, none, none, 0.0, 0.0, 1, 0.0, Ending.CONVERGED, k)
+        for k, value in enumerate((1.0, 4.0))
+    ]
+    assert "up to 4 times the best" in _method(ends, unit, None, BoxResult(0.0, 0))
