@@ -11,8 +11,10 @@ import pytest
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load_tables
 from laufruhe.load_models.star_model import StarModel
+from laufruhe.machine.firing import lap_orders
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
+from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
 from laufruhe.prove.throws.star_cuts import cut_of
 from laufruhe.solvers import solve
@@ -21,6 +23,7 @@ from laufruhe.solvers.stars.cut_search import _distinct_values, search_designs
 from laufruhe.solvers.stars.even_search import search_even
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.star_program import SolvedStar, coarse_value, shaft_owners, solve_design
+from laufruhe.solvers.walk import _change_order
 from phasing import engines
 
 TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)
@@ -113,6 +116,28 @@ def test_a_shaft_that_has_to_be_heavy_is_left_out_where_it_harms(tmp_path):
     found = search_designs(model, stars[:1], 1, 1e-4)
     assert found.lower_bound <= min(every.values())
     assert found.solved[0].value == pytest.approx(min(every.values()), rel=2e-4)
+
+
+def test_a_shaft_that_no_design_needs_is_not_built(tmp_path):
+    """Nothing of a three has order 3, and weights leave nothing else to gain."""
+    shafts = engines.shaft("against", -1) + engines.shaft("third", 3)
+    result = solve(engines.problem(tmp_path, 3, rest=engines.MOUNTS + engines.WEIGHTS + shafts + engines.MOUNT_FORCE))
+    built = {d.name: d.value for d in result.decisions if d.name.endswith("built")}
+    assert built == {"against built": 1.0, "third built": 0.0}
+
+
+def test_a_limit_that_nothing_open_moves_leaves_a_star_its_optimum(tmp_path):
+    """Beside one that binds: the design and its bound are those without it."""
+    fixed = '[[constraints]]\nlimit = "mean mount force"\norders = [2]\nmax = "1e6 N"\n'
+    binding = CASES["limited"].partition("[[constraints]]")
+    found = []
+    for limits in ("", fixed):
+        problem = engines.problem(tmp_path, 4, rest=binding[0] + limits + "".join(binding[1:]))
+        model, stars = model_of(problem)
+        design, cut = solve_design(model, tuple(map(int, stars[1])), (), 1e-4)
+        assert design.value * (1.0 - 1e-3) <= design.bound <= design.value
+        found.append((design.value, design.bound, *cut.bounds(stars, [()], shaft_owners(model))[:, 0]))
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
 def test_designs_that_are_told_as_proven_are_the_best(tmp_path):
@@ -305,3 +330,14 @@ def test_a_star_that_breaks_a_limit_which_nothing_open_moves_is_no_design(tmp_pa
         solved, cut = solve_design(model, star, (), 1e-4)
         assert (solved is None) == (aim is max)
         assert solved is not None or cut is None
+
+
+def test_a_walk_tries_every_firing_order_of_the_throws(tmp_path):
+    problem = engines.problem(tmp_path, 4, "four-stroke", rest=CASES["mean"])
+    phasing, throws = problem.phasing, (0.0, math.pi, math.pi, 0.0)
+    start = Candidate(throws, (1, 3, 4, 2))
+    orders = [*lap_orders(phasing.cycle, phasing.layout_of(start), throws)]
+    assert len(orders) > 1
+    for k, order in enumerate(orders):
+        assert _change_order(phasing, k, start, 0.0) == replace(start, firing_order=order)
+    assert _change_order(phasing, len(orders), start, 0.0) is None

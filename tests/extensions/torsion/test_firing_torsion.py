@@ -73,6 +73,7 @@ def test_every_firing_order_is_ranked(every: dict[tuple[int, ...], float]) -> No
         assert value == pytest.approx(every[order], rel=1e-9)
     assert result.objective.value == pytest.approx(min(every.values()), rel=1e-12)
     assert result.certificate.kind is Proof.GLOBAL
+    assert "by pairs of throws" in result.certificate.method
     assert result.certificate.lower_bound <= min(every.values())
     assert result.certificate.lower_bound == pytest.approx(min(every.values()), rel=1e-9)
 
