@@ -16,7 +16,7 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models import uneven_model
-from laufruhe.load_models.block_loads import OpenCrankLoads
+from laufruhe.load_models.block_loads import OpenCrankLoads, _relevant_orders
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.throw_waves import ThrowWaves
 from laufruhe.load_models.uneven_model import rotor_throws_of
@@ -319,3 +319,10 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
         held = own.fixed_at([decision.lower + stiffness * (decision.upper - decision.lower)])
         values += [objective_value(held, evaluate(held))]
     assert turned.objective.value <= min(values) * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_orders_matter_by_their_share_of_the_largest_motion(unit: float) -> None:
+    """In any unit of the load; high orders move the block by less, and a load of nothing moves it not at all."""
+    sizes, orders = np.array([1.0, 0.5, 0.0, 1e-12, 0.8]), np.array([0.0, 1.0, 2.0, 3.0, 1e6])
+    assert _relevant_orders(unit * sizes, orders).tolist() == [0, 1]

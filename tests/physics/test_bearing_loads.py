@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from laufruhe.numerics.exact_angles import cis
 from laufruhe.physics.bearing_loads import (
     beam_shares,
     crank_pin_factors,
+    has_bearing_loads,
     lever_shares,
     main_bearing_forces,
     pin_forces,
@@ -291,3 +293,10 @@ def test_a_journal_drags_at_its_radius_and_the_speed_of_its_shaft() -> None:
     assert Bearing("b", 0.0, diameter=0.06, friction=0.004, shaft=half).drag == pytest.approx(0.002 * 0.03)
     with pytest.raises(ModelError, match="no friction"):
         _ = Bearing("b", 0.0, diameter=0.06).drag
+
+
+@pytest.mark.parametrize(("pins", "uneven"), [((True, True), False), ((True, False), False), ((True, True), True)])
+def test_loads_inside_are_known_of_pins_at_even_speed_alone(pins: tuple[bool, ...], uneven: bool) -> None:
+    engine = SimpleNamespace(slider_cranks=[SimpleNamespace(has_pin_loads=known) for known in pins])
+    fidelity = SimpleNamespace(has_uneven_speed=uneven)
+    assert has_bearing_loads(engine, fidelity) is (all(pins) and not uneven)

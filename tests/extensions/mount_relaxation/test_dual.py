@@ -5,12 +5,14 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
 from laufruhe.extensions.mount_relaxation.cone_solver import (
     Cone,
     ConeSolver,
     column,
     matrix_of,
 )
+from laufruhe.extensions.mount_relaxation.program import RootTerm, SdpProgram, proven_bound
 
 SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
 SIZE, COUNT = 3, 4
@@ -86,3 +88,12 @@ def test_an_answer_does_not_depend_on_those_before(is_dual: bool) -> None:
     for cost in (*program.costs, *program.costs[::-1]):
         for told, alone in zip(several.solve(cost), program.solver(is_dual).solve(cost), strict=True):
             assert np.array_equal(told, alone)
+
+
+def test_a_root_is_proven_above_all_its_lengths() -> None:
+    """Three lengths that nothing open changes."""
+    rows, none = np.random.default_rng(5).normal(size=(3, 2, 1)), np.zeros(0)
+    root = RootTerm(1.0, 0.1, 5.0, ((0, rows),))
+    program = SdpProgram((1,), (none,), 1, 0, np.zeros(1), np.array([np.inf]), (), (), (), (), (root,), ())
+    bound = proven_bound(program, ConeProgram(program).solve(program).multipliers)
+    assert bound == pytest.approx(float(np.linalg.norm(rows[..., 0], axis=1).sum()), rel=1e-4)

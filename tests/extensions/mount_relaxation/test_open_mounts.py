@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
-from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
+from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, is_lifted, open_mounts
 from laufruhe.extensions.mount_relaxation.symmetry_split import split_mounts
 from laufruhe.extensions.mount_relaxation.unbalance_basis import unbalance_basis
 from laufruhe.problem.channels import mounting_in
@@ -120,3 +120,8 @@ def test_columns_of_unbalances_reach_from_minus_one_to_one(seed: int) -> None:
     assert np.all(farthest <= 1.0 + 1e-12)
     # of the sector less is reached
     assert np.all(farthest[:4] > 0.95)
+
+
+def test_springs_that_may_have_no_stiffness_are_lifted(tmp_path: Path) -> None:
+    bottomless = MOUNTS.replace('"20 N/mm", "4000 N/mm"', '"0 N/mm", "4000 N/mm"')
+    assert is_lifted(problem_of(tmp_path, ENGINE, BLOCK, bottomless, RMS))

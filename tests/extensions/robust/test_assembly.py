@@ -151,3 +151,14 @@ def test_no_part_of_the_search_is_left_out_that_holds_the_best(seed: int) -> Non
     assert search.value == pytest.approx(min(every), rel=1e-4)
     assert bound <= min(every) * (1.0 + 1e-12)
     assert bound >= min(every) * (1.0 - 1e-4)
+
+
+def test_parts_of_small_engines_are_as_welcome(read: Read) -> None:
+    light = FOUR.replace("1.25 kg", "0.25 kg")
+    problem = read(light + POINT + LEAST.format("mean shaking force") + '[assembly]\npistons = "p.csv"\n')
+    assert problem.extra(Assembly) is not None
+    with pytest.raises(InputError, match="above all differences of the parts"):
+        read(
+            FOUR.replace("1.25 kg", "0.01 kg") + POINT + LEAST.format("mean shaking force")
+            + '[assembly]\npistons = "p.csv"\n', pistons=(1290.0, 1250.0, 1240.0, 1230.0),
+        )  # fmt: skip

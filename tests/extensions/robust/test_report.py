@@ -85,4 +85,5 @@ def test_shares_are_a_file(built: Result, chosen: Result) -> None:
 def test_pictures_have_no_fault(built: Result, chosen: Result) -> None:
     for result, name in ((built, "robust"), (chosen, "assembly")):
         assert name in names(result)
+        assert all(axes.has_data() for axes in figure(result, name).axes)
         assert not faults_of(figure(result, name), result.problem.title)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import pytest
 
 import laufruhe
+from types import SimpleNamespace
+
+from laufruhe.extensions.robust import solver
 from laufruhe.extensions.robust.result import RobustResult
 from open_four import FOUR, solved_each
 from problem_files import changed
@@ -20,3 +23,12 @@ def test_the_worst_case_of_every_crank_is_that_of_the_best() -> None:
     assert found.objective.value == pytest.approx(best.objective.value, rel=2e-4)
     assert found.certificate.lower_bound <= min(one.objective.value for one in each)
     assert isinstance(found.details, RobustResult)
+
+
+@pytest.mark.parametrize("found", [None, SimpleNamespace(value=3.0)])
+def test_open_cranks_keep_what_is_known_of_the_design_as_given(found: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is told of it where no star has a design, or where it has no objective itself."""
+    problem = laufruhe.load(changed(FOUR, '"0.5 kg"', '"0.5 kg ± 5 %"') + "[robust]\nengines = 20\n")
+    result = SimpleNamespace(objective=found)
+    monkeypatch.setattr(solver, "solve_star_by_star", lambda *_: result)
+    assert solver.solve_built(problem, lambda _: SimpleNamespace(objective=None), lambda _: result) is result

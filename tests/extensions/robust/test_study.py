@@ -13,6 +13,7 @@ from laufruhe.extensions.robust.study import (
     GRAVITY,
     StudyTolerancesTable,
     ToleranceStudy,
+    _density,
     _marks,
     built,
     mean_mount_forces,
@@ -141,3 +142,11 @@ def test_engines_without_mounts_have_no_mount_forces() -> None:
     found = spread(bare, tolerances_of(0.01), 100)
     assert np.isnan(found["mount"])
     assert found["mean"] > 0.0
+
+
+def test_the_largest_density_is_one() -> None:
+    shares = np.linspace(0.0, 1.0, 401)
+    for unit in (1e-3, 1.0, 1e3):
+        _, density = _density(unit * (1.0 + shares**2), shares)
+        assert density.max() == pytest.approx(1.0)
+        assert density.min() == 0.0

@@ -179,3 +179,11 @@ def test_limits_of_built_engines_are_what_the_cycle_has_in_the_worst_of_them(
     assert result.status is told
     if told is Status.OPTIMAL:
         assert result.limits[0].value == pytest.approx(heaviest, rel=1e-6)
+
+
+def test_a_tolerance_costs_what_a_little_less_of_it_saves() -> None:
+    """The worst piston is the heaviest, and the load of a single is in proportion to it."""
+    result = solve(problem(engine={**ENGINE, "throws": [2]}, objective=SECOND, fidelity={"samples": 240}))
+    assert isinstance(result.details, RobustResult)
+    (priced,) = result.details.tolerances
+    assert priced.saving == pytest.approx(result.objective.value * 0.05 / 1.05, rel=1e-3)

@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from laufruhe.extensions.sizes.boxes import SizeBoxes
-from laufruhe.extensions.sizes.bundles import SizeReach
-from laufruhe.extensions.sizes.model import MASSES
+from laufruhe.extensions.sizes.bundles import GroupedRows, SizeReach
+from laufruhe.extensions.sizes.model import MASSES, Piece, plain
+from laufruhe.extensions.sizes.rod_series import RodSeries, _lengths
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.sets import Interval, Sector
 
@@ -44,3 +47,44 @@ def test_each_size_takes_numbers_one_way_or_is_refused() -> None:
     # it rises where the other is least, and falls where that is most
     with pytest.raises(ValueError, match="not monotonic in bore"):
         SizeBoxes._monotonicity(boxes, lambda x: np.array([x[0] * (0.5 - x[1])]))
+
+
+def piece_of(random: np.random.Generator, rows: int, columns: int, norm: str) -> Piece:
+    constant, slope = random.normal(size=(rows, 3)), random.normal(size=(rows, 3, columns))
+    return Piece(AffineNorm(NORMS[norm], constant, slope, plain(rows)), ((0, None, rows),), ())
+
+
+def test_a_series_between_two_lengths_is_that_of_its_nodes() -> None:
+    """Rows that are a polynomial of the reciprocal length are told exactly at every length."""
+    random, (low, high), terms = np.random.default_rng(3), (0.15, 0.35), 5
+    piece, powers = piece_of(random, 4, 2, "mean"), random.normal(size=(terms, 4, 3))
+
+    def rows(length: float) -> np.ndarray:
+        return np.tensordot(length ** -np.arange(terms), powers, axes=1)
+
+    nodes = np.array([rows(length) for length in _lengths(low, high, terms)])
+    series = RodSeries(piece, low, high, nodes, np.stack([nodes, 2.0 * nodes], axis=-1), np.zeros(3))
+    for length in (low, 0.2, 0.31, high):
+        told = series.at_length(length)
+        assert told.constant == pytest.approx(rows(length), rel=1e-9)
+        assert told.slope[..., 1] == pytest.approx(2.0 * rows(length), rel=1e-9)
+
+
+def test_rows_without_factors_are_summed_as_they_are() -> None:
+    random = np.random.default_rng(4)
+    series = RodSeries.fixed(piece_of(random, 4, 2, "mean"), 0.2)
+    z = random.normal(size=(4, 3))
+    total, largest = GroupedRows.from_rows(series, z).with_factors(())
+    assert total[0] == pytest.approx([np.sum(z * series.constant[0]), *np.einsum("kd,kdn->n", z, series.slope[0])])
+    assert largest == 1.0
+
+
+def test_rows_that_are_never_the_largest_are_left_out() -> None:
+    """The maximum stays what it is for all unbalances of the box."""
+    random = np.random.default_rng(6)
+    piece, low = piece_of(random, 200, 2, "maximum"), np.array([-0.1, 0.0])
+    high = low + 0.2
+    few = piece.pruned(low, high)
+    assert len(few.affine.constant) < 100
+    for columns in random.uniform(low, high, (50, 2)):
+        assert few.value((), columns) == pytest.approx(piece.value((), columns), rel=1e-12)
