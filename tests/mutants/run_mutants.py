@@ -5,8 +5,8 @@
     python tests/mutants/run_mutants.py run --page              # the sample; writes results/mutants/README.md
 
 `make mutants` does both. A mutant is killed if one of the tests that call its function fails, stops or takes far too
-long. Tests run in the order of their cost until `--seconds` of a core are used. A survivor is either equal to the
-source in all that it returns, or shows a test that is missing.
+long. Tests run in the order of their cost until `--seconds` of a core are used. What survives shows a test that is
+missing, unless it returns the same: `equivalent.csv` lists such mutants with the reason, and they are not run.
 
 A log keeps what became of each mutant. While the code of its file stays as it is, what is killed is not run again, and
 a survivor meets only tests that it has not met yet. Every test that kills has to pass without any change.
@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import compileall
 import contextlib
+import csv
 import json
 import os
 import shutil
@@ -38,6 +39,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from mutants.single_lines import ROOMS, SOURCE, Mutant, code_of, drawn  # noqa: E402
 
 PAGE = ROOT / "results" / "mutants" / "README.md"
+EQUIVALENT = Path(__file__).with_name("equivalent.csv")
+"""Mutants that return the same as the source: the change, and why."""
 MAP = ROOT / ".pytest_cache" / "functions-of-tests.json"
 TESTS = (*ROOMS, "numerics", "problem", "mounts", "phasing", "fidelity", "literature", "claims", "validation", "attack")
 OPTIONS = ("-q", "-p", "no:xdist", "-p", "no:cacheprovider", "--import-mode=importlib")
@@ -47,7 +50,7 @@ FEW = 10
 Key = tuple[str, str]
 Found = tuple[Mutant, str, int]
 """A mutant, what became of it, and how many tests it passed."""
-KILLED, SURVIVED, UNREACHED = "killed", "survived", "met no test"
+KILLED, SAME, SURVIVED, UNREACHED = "killed", "equivalent", "survived", "met no test"
 
 
 class Calls:
@@ -130,6 +133,12 @@ def write_map(arguments: argparse.Namespace) -> None:
     MAP.write_text(json.dumps(written), encoding="utf-8")
 
 
+def equivalents() -> dict[str, str]:
+    """Return the reason of each mutant that returns the same as the source, by its change."""
+    with EQUIVALENT.open(encoding="utf-8", newline="") as file:
+        return {row["change"]: row["reason"] for row in csv.DictReader(file)}
+
+
 def tests_of(mutant: Mutant, table: dict[str, Any], seconds: float, passed: Iterable[str]) -> list[str]:
     """Return the tests that call the function of a mutant, the cheapest first, up to a sum of core-seconds."""
     known = table["functions"].get(f"{mutant.file}:{mutant.function}", [])
@@ -200,7 +209,7 @@ def run(arguments: argparse.Namespace) -> None:
     sample = drawn(arguments.number, arguments.seed)
     if arguments.files:
         sample = [mutant for mutant in sample if any(part in mutant.file for part in arguments.files)]
-    killers: dict[Key, list[str]] = {}
+    same, killers = equivalents(), dict[Key, list[str]]()
     passed: dict[Key, set[str]] = defaultdict(set)
     for line in LOG.read_text(encoding="utf-8").splitlines() if LOG.exists() else ():
         entry = json.loads(line)
@@ -217,6 +226,8 @@ def run(arguments: argparse.Namespace) -> None:
             compileall.compile_dir(Path(folder) / str(k), quiet=2)
 
         def tried(mutant: Mutant) -> tuple[str, list[str]]:
+            if mutant.change in same:
+                return SAME, []
             key = mutant.change, code_of(mutant.file)
             if (failed := killers.get(key)) is not None:
                 return KILLED, failed
@@ -240,7 +251,7 @@ def run(arguments: argparse.Namespace) -> None:
             for mutant, (said, failed) in zip(sample, pool.map(tried, sample), strict=True):
                 found.append((mutant, said, len(passed[mutant.change, code_of(mutant.file)])))
                 unproven.update(failed)
-                if said != KILLED:
+                if said in (SURVIVED, UNREACHED):
                     print(f"{said}: {mutant}", flush=True)
         fine, failed = _forked(sorted(unproven), copies.get(), 600.0)
     if unproven and not fine:
@@ -249,11 +260,11 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"{killed} of {len(found)} mutants killed")
     if arguments.page:
         PAGE.parent.mkdir(exist_ok=True)
-        PAGE.write_text(page(found, len(table["tests"]), arguments), encoding="utf-8")
+        PAGE.write_text(page(found, same, len(table["tests"]), arguments), encoding="utf-8")
 
 
-def page(found: Iterable[Found], tests: int, arguments: argparse.Namespace) -> str:
-    """Return the page that says what was killed in each room and which mutants survive."""
+def page(found: Iterable[Found], same: dict[str, str], tests: int, arguments: argparse.Namespace) -> str:
+    """Return the page that says what was killed in each room, and which mutants are equivalent or open."""
     found = list(found)
     lines = [
         "# One-line mutants",
@@ -262,18 +273,22 @@ def page(found: Iterable[Found], tests: int, arguments: argparse.Namespace) -> s
         f"of operators, numbers, signs and extremes in the rooms below. Each meets those of the {tests} tests of the",
         "map that call its function, the cheapest first, until one fails or the time of a run is over. A run goes on",
         "where earlier ones ended: what is killed is not run again while the code of its file stays, and a survivor",
-        "meets only tests that it has not met yet. All tests that kill pass without a change. A survivor either",
-        "returns the same as the source, or shows a test that is missing.",
+        "meets only tests that it has not met yet. All tests that kill pass without a change. An equivalent mutant",
+        "returns the same as the source, or chooses another way to what is then proven; its reason stands in",
+        "`tests/mutants/equivalent.csv`. An open one shows a test that is missing.",
         "",
-        "| room | mutants | killed | share |",
-        "| --- | ---: | ---: | ---: |",
+        "| room | mutants | killed | equivalent | open | killed of the others |",
+        "| --- | ---: | ---: | ---: | ---: | ---: |",
     ]
     for room in (*ROOMS, "all"):
         own = [said for mutant, said, _ in found if room == "all" or mutant.file.startswith(f"laufruhe/{room}/")]
-        killed = sum(said == KILLED for said in own)
-        lines.append(f"| {room} | {len(own)} | {killed} | {killed / max(len(own), 1):.0%} |")
-    lines += ["", "## Survivors", "", "With the number of tests that each passed.", ""]
-    lines += [f"- {count}: `{mutant}`" for mutant, said, count in found if said != KILLED] or ["None."]
+        killed, alike = own.count(KILLED), own.count(SAME)
+        share = killed / max(len(own) - alike, 1)
+        lines.append(f"| {room} | {len(own)} | {killed} | {alike} | {len(own) - killed - alike} | {share:.0%} |")
+    lines += ["", "## Open", "", "With the number of tests that each passed.", ""]
+    lines += [f"- {n}: `{mutant}`" for mutant, said, n in found if said in (SURVIVED, UNREACHED)] or ["None."]
+    lines += ["", "## Equivalent", ""]
+    lines += [f"- `{mutant}`: {same[mutant.change]}" for mutant, said, _ in found if said == SAME] or ["None."]
     return "\n".join(lines) + "\n"
 
 

@@ -5,6 +5,7 @@ import difflib
 
 import pytest
 
+from mutants.run_mutants import equivalents
 from mutants.single_lines import ROOMS, SOURCE, all_mutants, drawn, mutants_of
 
 
@@ -82,6 +83,14 @@ def test_an_edit_leaves_all_other_mutants_in_the_sample(tmp_path, monkeypatch) -
     assert {m.function for m in samples[0]} == {"One.value"}
     assert [m.change for m in samples[1] if m.function != "more"] == [m.change for m in samples[0]]
     assert len(samples[1]) == len(samples[0]) + 2
+
+
+def test_what_is_listed_as_equivalent_is_a_mutant_with_a_reason() -> None:
+    listed = equivalents()
+    files = {change.partition(":")[0] for change in listed}
+    made = {mutant.change for file in files for mutant in mutants_of(SOURCE / file)}
+    assert not listed.keys() - made
+    assert all(len(reason.split()) > 3 for reason in listed.values())
 
 
 @pytest.mark.slow

@@ -103,7 +103,8 @@ SCENES: dict[str, Callable[[int], AffineProblem]] = {
 def test_the_optimum_is_the_same_in_every_unit_of_the_load(unit: float) -> None:
     problem = scene(4)
     terms = tuple(
-        (weight, replace(norm, constant=unit * norm.constant, slope=unit * norm.slope)) for weight, norm in problem.terms
+        (weight, replace(norm, constant=unit * norm.constant, slope=unit * norm.slope))
+        for weight, norm in problem.terms
     )
     own, other = newton_solution(problem), newton_solution(replace(problem, terms=terms))
     assert own is not None

@@ -151,6 +151,21 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
     assert told >= 2
 
 
+def test_a_budget_of_corners_that_is_spent_asks_for_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Halves of a box are then bounded by the corners that are known."""
+    problem = joint(780003)
+    boxes = DesignBoxes(problem, math.inf, lambda *_: math.inf)
+    ((lower, upper),) = boxes_of(problem, np.random.default_rng(2), 1, 0.02)
+    whole = float(boxes.bounds(lower[None], upper[None])[0][0])
+    known = len(boxes._corners)
+    monkeypatch.setattr(DesignBoxes, "max_corners", known)
+    middle = np.where(np.arange(len(lower)) == 0, 0.5 * (lower + upper), upper)
+    half = float(boxes.bounds(lower[None], middle[None])[0][0])
+    assert len(boxes._corners) == known
+    assert whole > 0.0
+    assert half > 0.0
+
+
 @pytest.mark.slow
 def test_loads_of_too_many_numbers_have_no_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
     boxes = DesignBoxes(joint(780004), math.inf, lambda *_: math.inf)

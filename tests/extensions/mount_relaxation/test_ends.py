@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from extensions.mount_relaxation.test_mode_boxes import NEAR, decoupled, designs_about
 from extensions.mount_relaxation.test_spring_bound import DAMPED, LIMITS, MEANS, asked_for
 from laufruhe.extensions.mount_relaxation.cone_program import ROUGH, ConeProgram, Objectives, bounds_ahead
-from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
+from laufruhe.extensions.mount_relaxation.prover import _Narrowing, narrowed, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -61,3 +62,19 @@ def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -
     boxes.bound(at, boxes.upper)
     found, alone = (ConeProgram(one.cut_off(one.lower, one.upper)[0], ROUGH).minimum(aim)[0] for one in (boxes, anew))
     assert found == alone
+
+
+@pytest.mark.parametrize("known", [None, (0.5, np.zeros(2))])
+def test_every_relaxation_of_a_box_counts_once(known: tuple[float, np.ndarray] | None) -> None:
+    """One that was solved before counts too, and is not solved anew."""
+    solved = []
+
+    def bound(*ends: np.ndarray) -> tuple[float, np.ndarray]:
+        solved.append(ends)
+        return 0.5, np.zeros(2)
+
+    search = SimpleNamespace(value=1.0, cutoff=0.9, contracted=lambda *ends: ends, bound=bound)
+    narrowing = _Narrowing(search, 10, None, known)
+    assert narrowing.narrow(np.zeros(2), np.ones(2))[0] == 0.5
+    assert narrowing.spent == 1
+    assert len(solved) == (known is None)

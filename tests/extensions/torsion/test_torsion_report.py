@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.extensions.torsion.facts import torque_over_speed
+from laufruhe.extensions.torsion import modes_picture
+from laufruhe.extensions.torsion.facts import facts_of, speed_range, torque_over_speed
 from laufruhe.extensions.torsion.modes_picture import COLOURS
 from laufruhe.extensions.torsion.physics import chain_of, natural_modes, shaft_torque, vector_sums
 from laufruhe.plots import names
@@ -102,6 +103,18 @@ def test_places_and_tables(result: Result, record: dict) -> None:
 
 def test_pictures(result: Result) -> None:
     assert {"twist_modes", "twist_response"} <= set(names(result))
+
+
+def test_dots_of_a_picture_are_critical_speeds_on_the_lines_of_their_orders(result: Result) -> None:
+    speeds = modes_picture.figure(result).axes[1]
+    dots = [line.get_xydata()[0] for line in speeds.lines if line.get_marker() == "o"]
+    facts = facts_of(result.final, *speed_range(result))
+    expected = [
+        (60.0 * frequency / order, frequency)
+        for frequency in facts.modes.frequencies[:3] for order in facts.orders
+        if math.tau * frequency / order <= speed_range(result)[1]
+    ]  # fmt: skip
+    assert np.array(sorted(map(tuple, dots))) == pytest.approx(np.array(sorted(expected)))
 
 
 @pytest.mark.slow
