@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from attack.crossings import transmissibility_and_weights
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
@@ -42,6 +43,23 @@ def test_a_limit_with_room_takes_nothing_from_the_proof(problem: Problem) -> Non
     assert found.objective.value == pytest.approx(38.3224, rel=1e-5)
     assert found.certificate.lower_bound <= _minimum(problem) * (1.0 + 1e-9)
     assert [limit.name for limit in found.limits] == [limit.name for limit in problem.limits]
+
+
+def test_the_optimum_without_a_limit_that_it_keeps_is_the_optimum() -> None:
+    """A weight under a limit on transmissibility, of which cone programs know nothing: against random designs."""
+    own = laufruhe.load({"title": "ratio", **transmissibility_and_weights(np.random.default_rng(1))})
+    found, random = laufruhe.solve(own), np.random.default_rng(2)
+    assert found.certificate is not None
+    assert found.certificate.kind is Proof.GLOBAL
+    assert "dual bound" in found.certificate.method
+    assert found.final.violation(own.limits) <= 1e-6
+    (decision,) = own.decisions
+    for _ in range(20):
+        design = evaluate(
+            own, own.design([decision.set.directions[0] * random.uniform(decision.lower, decision.upper)])
+        )
+        if design.violation(own.limits) <= 0.0:
+            assert found.certificate.lower_bound <= objective_value(own, design)
 
 
 @pytest.mark.slow
