@@ -459,7 +459,7 @@ def test_a_limit_that_turns_out_to_hold_is_searched_with(tmp_path):
         place = search.joint.start([d.start for d in problem.mount_decisions], none)
         end = LocalOptimum(place, 1.0, none, none, 0.0, 0.0, 1, 0.0, Ending.CONVERGED, 0)
 
-        def look(search=search, rows=rows, end=end):
+        def look(search=search, rows=rows, end=end, held=held):
             rows.append(held.name in search._program().program.constraint_names)
             search._evaluate_optima([end])
 

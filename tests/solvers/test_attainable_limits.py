@@ -29,9 +29,9 @@ from laufruhe.report.wording import attainable, explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.attainable_limits import CLOSE, LONG, _bisect, with_attainable_limits
-from laufruhe.solvers.values import AttainableLimit
 from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design, infeasible_result
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.values import AttainableLimit
 
 SINGLE = {
     "layout": "inline", "cycle": "four-stroke", "bore": "100 mm", "stroke": "120 mm", "rod_ratio": 0.28,

@@ -15,9 +15,11 @@ from attack.families import problem as random_problem
 from attack.own_problem import Own
 from lanes import first_fast
 from laufruhe.extensions.joint_mounts.load_boxes import LoadBoxes, is_boxed, load_bounds
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
 from laufruhe.extensions.joint_mounts.prover import EARLY
 from laufruhe.problem.evaluation import evaluate, objective_value, with_default_sampling
 from laufruhe.problem.problem import Problem
+from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 
 INPUTS = Path(__file__).parents[2] / "claims" / "inputs"
 # rms, mean and largest force and travel on stiff, moved and turned mounts, under limits of loads and modes
@@ -115,3 +117,18 @@ def test_a_share_of_the_boxes_is_divided_first() -> None:
     assert few.bound < minimum * (1.0 - 1e-4)
     assert many.boxes > few.boxes
     assert many.bound > few.bound
+
+
+def test_a_ratio_beside_a_force_keeps_all_orders(tmp_path: Path) -> None:
+    """Orders that add nothing to a limited force may be most of a transmissibility; of a force alone they are left."""
+    limit = '[[constraints]]\nlimit = "rms mount force"\nmax = "1e9 N"\n'
+    left_out = []
+    for minimised in ("transmissibility", "rms mount force"):
+        asked = f'[objective]\nminimise = "{minimised}"\n'
+        problem = with_default_sampling(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked, limit))
+        boxes = LoadBoxes(problem, 1e9)
+        left_out.append(len(MountedLoads(problem).orders.orders) - len(boxes._orders.orders))
+        near = np.array([d.start for d in problem.mount_decisions])
+        bound = float(boxes.bounds(near[None] * (1.0 - 1e-4), near[None] * (1.0 + 1e-4))[0][0])
+        assert bound <= objective_value(problem, evaluate(problem)) * (1.0 + 1e-9)
+    assert left_out[0] == 0 < left_out[1]

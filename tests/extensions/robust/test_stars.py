@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 import laufruhe
-from types import SimpleNamespace
-
 from laufruhe.extensions.robust import solver
 from laufruhe.extensions.robust.result import RobustResult
 from open_four import FOUR, solved_each
