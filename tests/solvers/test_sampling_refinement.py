@@ -82,3 +82,16 @@ def test_a_crank_of_a_box_that_breaks_a_limit_is_no_design() -> None:
     assert free.phasing is not None
     assert evaluate_crank(free.phasing, candidate) is not None
     assert evaluate_crank(phasing, candidate) is None
+
+
+def test_a_proven_optimum_that_breaks_a_peak_between_angles_is_solved_anew() -> None:
+    """The least mass under the least peak there is: a gap that is closed at few angles ends no search."""
+    weight = {"name": "w", "x": "0 mm", "radius": "1 m", "angle": {"between": [0, 360]},
+              "unbalance": {"between": ["0 kg m", "0.1 kg m"]}}  # fmt: skip
+    told = {"engine": {**ENGINE, "throws": [3]}, "counterweights": [weight]}
+    peak = {"minimise": "maximum shaking force"}
+    minimum = solve(problem(told, objective=peak, fidelity={"samples": 5760})).objective.value
+    limit = {"limit": "maximum shaking force", "max": f"{minimum} N"}
+    result = solve(problem(told, objective={"minimise": "added mass"}, constraints=[limit], fidelity={"samples": 48}))
+    assert result.status is Status.OPTIMAL
+    assert result.final.violation(result.problem.limits) <= FEASIBILITY_TOL
