@@ -17,8 +17,11 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.throws.firing_windows_bound import minimum_bound, star_bounds, throw_costs, uneven_bound
 from laufruhe.solvers import solve
+from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
+from laufruhe.solvers.smooth.program import SmoothProgram
 from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
+from laufruhe.solvers.throws import uneven_throws
 from laufruhe.solvers.throws.uneven_throws import local_optimum
 from phasing import engines
 from problem_files import PROBLEMS, loaded
@@ -105,6 +108,26 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
     assert phasing.intervals.holds(found.result.final.engine.firing_intervals)
     still = local_optimum(phasing, start, Intervals(phasing.even_interval, phasing.even_interval))
     assert still.value == pytest.approx(given, rel=1e-12)
+
+
+def test_prices_are_those_of_an_end_as_good_as_the_best_crank(tmp_path, monkeypatch):
+    """Of ends to both sides of a crank one is better; the worse one tells nothing of its limits."""
+    phasing = engines.problem(tmp_path, 6, phasing='intervals = { largest_deviation = "8 deg" }').phasing
+    throws = tuple(math.tau * p / 6 for p in (0, 3, 1, 5, 2, 4))
+    order = tuple(int(k) + 1 for k in np.argsort([-angle % math.tau for angle in throws]))
+    start, none, better = Candidate(throws, order), np.zeros(0), []
+    for side in (-0.05, 0.0, 0.05):
+        asked = []
+
+        def ended(program, starts, side=side, **_):
+            x = starts[0] + side * (starts[1] - starts[0])
+            return [LocalOptimum(x, 1.0, none, none, 0.0, 0.0, 1, 0.0, Ending.CONVERGED, 0)]
+
+        monkeypatch.setattr(uneven_throws, "solve_nonlinear", ended)
+        monkeypatch.setattr(SmoothProgram, "prices", lambda *_, asked=asked: asked.append(1) or {})
+        better.append(local_optimum(phasing, start, phasing.intervals).candidate != start)
+        assert bool(asked) is (better[-1] or side == 0.0)
+    assert sorted(better) == [False, False, True]
 
 
 def test_a_start_that_fires_too_unevenly_leads_to_a_crank_that_does_not(tmp_path):

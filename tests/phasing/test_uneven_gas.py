@@ -117,6 +117,16 @@ def test_orders_left_out_hardly_change_sampled_measures(tmp_path, measure):
     assert float(smooth_value(model, quantity, 1e-6)) == pytest.approx(evaluate(exact).value(quantity), rel=1e-2)
 
 
+def test_all_points_have_the_samples_that_the_highest_order_of_any_needs(tmp_path):
+    """A motored point has few orders; the mean of the fired one is that of the exact model all the same."""
+    motored = '[[operating_points]]\nname = "motored"\nspeed = "3000 rpm"\ngas = false\nweight = 2\n'
+    phasing, start, moves = scene(tmp_path, "four-stroke five", MOUNT_FORCE + motored)
+    at, exact = moved(moves, np.random.default_rng(5).uniform(-0.2, 0.2, moves.size))
+    quantity = exact.objective[0].measure
+    smooth = float(smooth_value(model_of(phasing, start, at), quantity, 1e-9))
+    assert smooth == pytest.approx(evaluate(exact).value(quantity), rel=1e-5)
+
+
 def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
     phasing, start, moves = scene(tmp_path, "four-stroke five")
     at, exact = moved(moves, np.random.default_rng(6).uniform(-0.2, 0.2, moves.size))
