@@ -87,7 +87,7 @@ def test_the_ready_problem_has_its_card_and_its_holes(folder: Path) -> None:
     result = run(PROBLEMS / "vee-eight-balance-job.toml", "--format", "png")
     assert result.exit_code == 0, result.stderr
     made = folder / "results" / "vee-eight-balance-job-balance"
-    assert "1505.20" in (made / "bob-weights.csv").read_text(encoding="utf-8")
+    assert "bob weight,,1505.2" in (made / "bob-weights.csv").read_text(encoding="utf-8")
     assert "![The two planes to scale" in (made / "report.md").read_text(encoding="utf-8")
     assert (made / "planes.png").exists()
 
@@ -99,6 +99,20 @@ def test_too_few_holes_have_status_one_and_the_best_design(folder: Path) -> None
     assert result.exit_code == 1
     assert "No design with at most 2 holes in a plane is proven to correct 'left' and 'right'" in result.stdout
     assert (folder / "results" / "disc-balance" / "holes.csv").exists()
+
+
+@pytest.mark.slow
+def test_the_report_has_the_units_of_choice_and_the_list_its_own(folder: Path) -> None:
+    text = JOB.replace("[correction]", 'units = { unbalance = "oz in", length = "in", mass = "oz" }\n[correction]', 1)
+    (folder / "disc.toml").write_text(text.replace('"8 mm"', '"0.375 in"'), encoding="utf-8")
+    result = run("disc.toml")
+    assert result.exit_code == 0, result.stderr
+    report = (folder / "results" / "disc-balance" / "report.md").read_text(encoding="utf-8")
+    assert "diameter \\[in\\]" in report
+    # 400 g mm and 20 g mm
+    assert "| left | 0.5555 | 77.0 |" in report
+    assert "| 0.02777 | yes |" in report
+    assert "depth [mm]" in (folder / "results" / "disc-balance" / "holes.csv").read_text(encoding="utf-8")
 
 
 def test_a_rotor_within_its_grade_needs_no_hole(folder: Path) -> None:

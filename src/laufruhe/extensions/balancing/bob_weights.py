@@ -9,10 +9,11 @@ from typing import Any, ClassVar, Self
 from laufruhe.errors import counted
 from laufruhe.machine import Engine
 from laufruhe.machine.extra import Extra
-from laufruhe.present.numbers import fixed, share
+from laufruhe.present.numbers import aligned, number, share
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
 ROTATING = ("big_end", "bearing_shells")
 RECIPROCATING = ("piston", "pin", "rings", "locks", "small_end")
@@ -59,26 +60,30 @@ class BobWeights(Extra):
 
 
 def card(engine: Engine, weights: BobWeights) -> Table:
-    """Return the card of bob weights [g], with a column for every crank pin, or one for all if they are equal."""
+    """Return the card of bob weights, with a column for every crank pin, or one for all if they are equal."""
     throws = [weights.shares(k) for k in range(len(weights.throws))]
     radii = [engine.slider_cranks[on_pin[0]].crank_radius for on_pin in weights.throws]
     names = [", ".join(engine.slider_cranks[i].name for i in on_pin) for on_pin in weights.throws]
     if all(pair == (throws[0], radii[0]) for pair in zip(throws, radii, strict=True)):
         names, throws, radii = [f"each of {counted(len(throws), 'crank pin')}"], throws[:1], radii[:1]
     columns = {name: [shares[name] for shares in throws] for name in throws[0]}
+    totals = [weights.mass(k) for k in range(len(throws))]
+    (unit, grams), (unbalance, size) = readable("kg", "g"), readable("kg m", "g mm")
+    largest = grams * max(totals)
     rows = [
-        [name.replace("_", " "), share(cells[0][1]), *(fixed(1e3 * mass * part, 2) for mass, part in cells)]
+        [name.replace("_", " "), share(cells[0][1]), *(aligned(grams * m * part, largest) for m, part in cells)]
         for name, cells in columns.items()
         if any(mass for mass, _ in cells)
     ]
-    totals = [weights.mass(k) for k in range(len(throws))]
-    rows.append(["bob weight", "", *(fixed(1e3 * mass, 2) for mass in totals)])
-    rows.append(["unbalance [g mm]", "", *(fixed(1e6 * m * r, 0) for m, r in zip(totals, radii, strict=True))])
+    rows.append(["bob weight", "", *(aligned(grams * mass, largest) for mass in totals)])
+    rows.append(
+        [f"unbalance [{unbalance}]", "", *(number(size * m * r, 5) for m, r in zip(totals, radii, strict=True))]
+    )
     note = (
-        "Grams on a crank pin, all rods of the pin counted: rotating masses and oil in full, reciprocating masses with "
+        "On a crank pin, all rods of the pin counted: rotating masses and oil in full, reciprocating masses with "
         f"the balance factor. The unbalance is that at the crank radius. {_difference(engine, weights)}"
     )
-    return Table(("part", "share", *names), rows, title="Bob weights [g]", note=note, file=CARD)
+    return Table((f"part [{unit}]", "share", *names), rows, title="Bob weights", note=note, file=CARD)
 
 
 def _difference(engine: Engine, weights: BobWeights) -> str:
@@ -91,10 +96,9 @@ def _difference(engine: Engine, weights: BobWeights) -> str:
     )
     if worst[0] <= 1e-4 * worst[3]:
         return "The reciprocating parts have the mass of [engine]."
-    return (
-        f"The reciprocating parts of {worst[1]} have {fixed(1e3 * worst[2], 1)} g, "
-        f"but [engine] has {fixed(1e3 * worst[3], 1)} g."
-    )
+    unit, grams = readable("kg", "g")
+    listed_mass, mass = (number(grams * one, 5) for one in worst[2:])
+    return f"The reciprocating parts of {worst[1]} have {listed_mass} {unit}, but [engine] has {mass} {unit}."
 
 
 def record(engine: Engine, weights: BobWeights) -> Mapping[str, Any]:

@@ -18,7 +18,7 @@ from laufruhe.extensions.balancing.physics import Dial, Drilling, Hole, Plane, p
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, require_distinct, require_one_of
 from laufruhe.files.fields import Name, Table
-from laufruhe.files.problem_file import ExtensionContext, Key
+from laufruhe.files.problem_file import ExtensionContext, Key, UnitsTable
 from laufruhe.files.reader import display_path, load_tables, tables_of
 from laufruhe.machine.rotor import grade_of, permitted_unbalance
 from laufruhe.numerics.exact_angles import direction
@@ -135,6 +135,7 @@ class CorrectionFile(Table):
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)
     tolerance: f.Tolerance = 1e-4
+    units: UnitsTable = Field(default_factory=UnitsTable)
     correction: CorrectionTable
 
 
@@ -171,11 +172,12 @@ class Correction:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Balancing job of a file: bob weights of its engine, a correction, or both."""
+    """Balancing job of a file: bob weights of its engine, a correction, or both; `units` are those of its report."""
 
     title: str
     source: str
     assumptions: Sequence[str]
+    units: Mapping[str, str]
     problem: Problem | None
     correction: Correction | None
 
@@ -190,14 +192,14 @@ def load_job(path: Path) -> Job:
         problem = load_tables(tables, source)
         table = tables.get("correction")
         correction = None if table is None else correction_of(_validated(table), problem.tolerance)
-        return Job(problem.title, problem.source, problem.assumptions, problem, correction)
+        return Job(problem.title, problem.source, problem.assumptions, dict(problem.shown_units), problem, correction)
     try:
         with errors_in_file(source):
             file = CorrectionFile.model_validate(tables)
-            correction = correction_of(file.correction, file.tolerance)
+            correction, chosen = correction_of(file.correction, file.tolerance), dict(file.units.by_si_unit())
     except ValidationError as error:
         raise InputError(str(source), complaints_of(error, CorrectionFile)) from None
-    return Job(file.title, file.source, file.assumptions, None, correction)
+    return Job(file.title, file.source, file.assumptions, chosen, None, correction)
 
 
 def _validated(table: Mapping[str, Any]) -> CorrectionTable:

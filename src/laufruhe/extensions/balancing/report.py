@@ -28,6 +28,7 @@ from laufruhe.report.screen import show_document
 from laufruhe.report.strict_json import strict, versions
 from laufruhe.report.table_files import write_csv
 from laufruhe.report.web_page import as_html
+from laufruhe.units import readable, shown_in
 
 HOLES, PICTURE = "holes", "planes"
 NAMES = (
@@ -85,7 +86,8 @@ def balanced(
             pictures[PICTURE] = save_picture(picture(job, answer), stage / PICTURE, kinds)
         if (sheet := _card(job)) is not None:
             write_csv(sheet, stage / f"{CARD}.csv")
-        document = report(job, answer, typed("laufruhe", "balance", str(path)))
+        with shown_in(job.units):
+            document = report(job, answer, typed("laufruhe", "balance", str(path)))
         text = as_json(job, answer)
         files.write(stage / files.RESULT, text)
         files.write(stage / files.REPORT, document.as_markdown(f".{kinds[0]}"))
@@ -161,16 +163,16 @@ def _proof(answer: Balanced) -> str:
 
 
 def _hole_table(answer: Balanced) -> Table:
+    drilling, dial = answer.correction.drilling, answer.correction.dial
+    (length, millimetres), (mass, grams), (unbalance, size) = _units()
     rows = [
-        (f"{k}", plane.name, _kind(hole), fixed(1e3 * hole.diameter, 2), fixed(1e3 * hole.depth, 2),
-         fixed(math.degrees(answer.correction.dial.reading(angle)), 1), fixed(math.degrees(angle) % 360.0, 1),
-         fixed(1e3 * answer.correction.drilling.mass(hole.diameter, hole.depth, hole.filled), 2, "+"),
-         fixed(GRAM_MM * hole.change, 1, "+"))
+        (f"{k}", plane.name, _kind(hole), trimmed(millimetres * hole.diameter), trimmed(millimetres * hole.depth),
+         fixed(math.degrees(dial.reading(angle)), 1), fixed(math.degrees(angle) % 360.0, 1),
+         _signed(grams * drilling.mass(hole.diameter, hole.depth, hole.filled)), _signed(size * hole.change))
         for k, (plane, angle, hole) in enumerate(answer.holes, 1)
     ]  # fmt: skip
-    head = ("hole", "plane", "kind", "diameter [mm]", "depth [mm]", "angle at the machine [deg]",
-            "angle on the crank [deg]", "mass [g]", "unbalance [g mm]")  # fmt: skip
-    drilling, dial = answer.correction.drilling, answer.correction.dial
+    head = ("hole", "plane", "kind", f"diameter [{length}]", f"depth [{length}]", "angle at the machine [deg]",
+            "angle on the crank [deg]", f"mass [{mass}]", f"unbalance [{unbalance}]")  # fmt: skip
     way = "towards the axis" if drilling.is_radial else "along the axis"
     sense = "with" if dial.sense > 0.0 else "against"
     zero = fixed(math.degrees(dial.zero) % 360.0, 1)
@@ -182,6 +184,15 @@ def _hole_table(answer: Balanced) -> Table:
         f"The machine counts {sense} the rotation from the zero mark, at {zero} deg on the crank."
     )
     return Table(head, rows, title="Holes", left=(1, 2), note=note)
+
+
+def _units() -> tuple[tuple[str, float], ...]:
+    # units of lengths, masses and unbalances in the report, with factors on SI values
+    return readable("m"), readable("kg", "g"), readable("kg m", "g mm")
+
+
+def _signed(value: float) -> str:
+    return f"{'+' if value > 0.0 else '-'}{number(abs(value))}"
 
 
 def _kind(hole: Hole) -> str:
@@ -216,15 +227,16 @@ def _hole_records(answer: Balanced) -> list[dict[str, Any]]:
 
 
 def _plane_table(answer: Balanced) -> Table:
-    dial = answer.correction.dial
+    dial, (unit, size) = answer.correction.dial, _units()[2]
     rows = [
-        (result.plane.name, number(GRAM_MM * abs(result.plane.initial)), _angle(result.plane.initial, dial.reading),
-         f"{len(result.design)}", number(GRAM_MM * abs(result.residual), 3), _angle(result.residual, dial.reading),
-         DASH if result.plane.permitted is None else number(GRAM_MM * result.plane.permitted),
+        (result.plane.name, number(size * abs(result.plane.initial)), _angle(result.plane.initial, dial.reading),
+         f"{len(result.design)}", number(size * abs(result.residual), 3), _angle(result.residual, dial.reading),
+         DASH if result.plane.permitted is None else number(size * result.plane.permitted),
          DASH if result.plane.permitted is None else "yes" if result.is_met else "no")
         for result in answer.planes
     ]  # fmt: skip
-    head = ("plane", "before [g mm]", "at [deg]", "holes", "residual [g mm]", "at [deg]", "permitted [g mm]", "met")
+    head = ("plane", f"before [{unit}]", "at [deg]", "holes", f"residual [{unit}]", "at [deg]", f"permitted [{unit}]",
+            "met")  # fmt: skip
     note = "Angles as read at the machine."
     rule = f" Permitted: {answer.correction.rule}." if answer.correction.rule else ""
     return Table(head, rows, title="Unbalance of the planes", note=note + rule)
@@ -235,21 +247,21 @@ def _angle(unbalance: complex, reading: Callable[[float], float]) -> str:
 
 
 def _count_table(answer: Balanced) -> Table:
-    numbers = max(len(result.counts) for result in answer.planes)
+    numbers, (unit, size) = max(len(result.counts) for result in answer.planes), _units()[2]
     rows = [
-        (f"{holes}", *(cell for result in answer.planes for cell in _count_cells(result, holes)))
+        (f"{holes}", *(cell for result in answer.planes for cell in _count_cells(result, holes, size)))
         for holes in range(numbers)
     ]
     head = ["holes", *(f"{result.plane.name}: {text}" for result in answer.planes
-                       for text in ("least residual [g mm]", "lower bound [g mm]"))]  # fmt: skip
+                       for text in (f"least residual [{unit}]", f"lower bound [{unit}]"))]  # fmt: skip
     note = "Least residual with exactly so many holes. A dash: not needed, or no such design."
     return Table(head, rows, title="Holes against residual", note=note, left=0)
 
 
-def _count_cells(result: PlaneResult, holes: int) -> tuple[str, str]:
+def _count_cells(result: PlaneResult, holes: int, size: float) -> tuple[str, str]:
     if holes >= len(result.counts):
         return DASH, DASH
-    return tuple(number(GRAM_MM * one, 4) for one in (result.counts[holes].value, result.counts[holes].bound))  # type: ignore[return-value]
+    return number(size * result.counts[holes].value), number(size * result.counts[holes].bound)
 
 
 def _card(job: Job) -> Table | None:
