@@ -13,7 +13,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar, Union
 
-from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError, check_integer, wrong_call
+from laufruhe.errors import (
+    InputError,
+    LaufruheError,
+    ModelError,
+    SolverError,
+    check_integer,
+    optional_libraries,
+    wrong_call,
+)
 from laufruhe.version import __version__
 
 if TYPE_CHECKING:
@@ -129,7 +137,7 @@ def _on_one_thread(call: Callable[P, T]) -> Callable[P, T]:
     def limited(*args: P.args, **kwargs: P.kwargs) -> T:
         from laufruhe.numerics.cores import one_thread
 
-        with one_thread():
+        with one_thread(), optional_libraries():
             return call(*args, **kwargs)
 
     return limited

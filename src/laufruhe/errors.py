@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copyreg
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
@@ -101,6 +103,22 @@ class UncarriedLoadError(ModelError):
 
 class SolverError(LaufruheError, RuntimeError):
     """Solver that stopped without a usable result."""
+
+
+OPTIONAL_LIBRARIES = {"casadi": "casadi", "cvxpy": "cvxpy-base"}
+"""Libraries that only some problems need, and the names of their packages."""
+
+
+@contextmanager
+def optional_libraries() -> Iterator[None]:
+    """Turn the import of a missing optional library in the block into a `SolverError` with the command of pip."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = OPTIONAL_LIBRARIES.get(error.name or "")
+        if package is None:
+            raise
+        raise SolverError(f"the Python library {error.name} is missing; pip install {package}") from None
 
 
 class BoundError(LaufruheError, RuntimeError):

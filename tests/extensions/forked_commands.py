@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 LIBRARIES = (
-    "casadi", "clarabel", "cvxpy", "jinja2", "matplotlib.pyplot", "netCDF4", "numpy", "pandas", "PIL.Image", "pint",
+    "casadi", "clarabel", "cvxpy", "jinja2", "matplotlib.pyplot", "numpy", "pandas", "PIL.Image", "pint",
     "pydantic", "rich.console", "scipy.integrate", "scipy.optimize", "scipy.signal", "scipy.sparse", "typer", "xarray",
     "xlsxwriter",
 )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -50,5 +51,59 @@ def test_without_casadi_counterweights_are_decided_and_uneven_throws_say_what_th
     paths = [str(PROBLEMS / f"{name}.toml") for name in ("tractor-single", "inline-nine-uneven")]
     found = subprocess.run([sys.executable, "-c", SCRIPT, *paths], check=True, capture_output=True, text=True)
     assert found.stdout.splitlines() == [
-        "optimal", "these open numbers need casadi, which is not installed; pip install casadi",
+        "optimal", "the Python library casadi is missing; pip install casadi",
+    ]  # fmt: skip
+
+
+PLAIN = """
+import sys
+sys.modules |= dict.fromkeys(("casadi", "cvxpy", "netCDF4", "openpyxl", "dask", "distributed", "zarr"))
+import laufruhe
+from laufruhe.cli import app
+from typer.testing import CliRunner
+problem, mounts, folder = sys.argv[1:]
+loaded = laufruhe.load(problem)
+for call in loaded.to_cvxpy, loaded.to_casadi, lambda: laufruhe.solve(problem, solver="SCS"):
+    try:
+        call()
+    except laufruhe.SolverError as error:
+        print(error)
+for words in (["solve", mounts], ["study", "sweep.toml"]):
+    answer = CliRunner().invoke(app, [*words, "--out", folder + words[0]])
+    print(answer.exit_code, answer.stderr.strip().rpartition(": ")[2])
+import xarray
+print(xarray.open_dataset(f"{folder}study/one.nc").attrs["kind"])
+from laufruhe.files.number_tables import _of_spreadsheet
+try:
+    _of_spreadsheet(b"", None)
+except laufruhe.ModelError as error:
+    print(error)
+"""
+STUDY = """
+title = "Share"
+[study]
+[[study.parts]]
+name = "one"
+kind = "counterweight fraction"
+title = "Share"
+sweep = [{ quantity = "counterweights.web.balance_factor", from = 0, to = 1, points = 2 }]
+cases = [{ name = "single", problem = "tractor-single.toml" }]
+"""
+
+
+@pytest.mark.slow
+def test_a_plain_installation_says_what_each_call_needs(tmp_path: Path) -> None:
+    """A study writes netCDF without a library of its own; other calls name the command of pip."""
+    (tmp_path / "sweep.toml").write_text(STUDY, encoding="utf-8")
+    name = "tractor-single.toml"
+    (tmp_path / name).write_text((PROBLEMS / name).read_text(encoding="utf-8"), encoding="utf-8")
+    paths = [str(PROBLEMS / "tractor-four-lanchester.toml"), str(PROBLEMS / "powertrain-torque-roll.toml"), "out"]
+    found = subprocess.run(
+        [sys.executable, "-c", PLAIN, *paths], check=True, capture_output=True, text=True, cwd=tmp_path
+    )
+    cvxpy = "the Python library cvxpy is missing; pip install cvxpy-base"
+    assert found.stdout.splitlines() == [
+        cvxpy, "the Python library casadi is missing; pip install casadi", cvxpy,
+        f"1 {cvxpy}", "0 ", "counterweight fraction",
+        "is a spreadsheet, and the Python library openpyxl is missing; pip install openpyxl",
     ]  # fmt: skip

@@ -25,7 +25,6 @@ HEAVY = {
     "distributed",
     "jinja2",
     "matplotlib",
-    "netCDF4",
     "openpyxl",
     "pandas",
     "pint",

@@ -19,7 +19,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 CITATION = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
 RECIPE = (ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8")
 # names of the same libraries on conda-forge
-CONDA = {"cvxpy-base": "cvxpy", "matplotlib-base": "matplotlib", "netcdf4": "netCDF4"}
+CONDA = {"matplotlib-base": "matplotlib"}
 
 
 def test_one_version_everywhere() -> None:
@@ -39,7 +39,9 @@ def test_the_recipe_needs_what_the_package_needs() -> None:
 def test_the_lowest_versions_are_those_that_are_tested() -> None:
     """Each as pyproject.toml has it, all others as in constraints.txt where they may be."""
     lowest = dict(_pins("constraints-lowest.txt"))
-    needed = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["cluster"]]
+    extras = PROJECT["optional-dependencies"]
+    assert extras["all"] == [f"laufruhe[{','.join(sorted(set(extras) - {'all'}))}]"]
+    needed = [*PROJECT["dependencies"], *(one for name in set(extras) - {"all"} for one in extras[name])]
     for name, version in (one.split(">=") for one in needed):
         assert re.fullmatch(rf"{re.escape(version)}(\.0)*", lowest[_plain(name)]), name
     assert len(lowest) > len(needed)

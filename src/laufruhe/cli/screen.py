@@ -18,7 +18,16 @@ from typing import Any, TextIO, TypeAlias
 
 import typer
 
-from laufruhe.errors import Complaint, InputError, LaufruheWarning, ModelError, SolverError, printed, refused
+from laufruhe.errors import (
+    Complaint,
+    InputError,
+    LaufruheWarning,
+    ModelError,
+    SolverError,
+    optional_libraries,
+    printed,
+    refused,
+)
 from laufruhe.numerics.progress import SearchState, Step
 
 QUIET, PLAIN, VERBOSE = -1, 0, 1
@@ -153,7 +162,8 @@ def complain(lines: str) -> None:
 def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was written") -> Iterator[None]:
     """Turn errors into one line each and an exit status."""
     try:
-        yield
+        with optional_libraries():
+            yield
     except InputError as error:
         complain(str(error))
         raise typer.Exit(BAD_INPUT) from None

@@ -236,8 +236,10 @@ def _headings(rows: Sequence[Row], usual: Sequence[int], width: int) -> tuple[tu
 
 def _of_spreadsheet(content: bytes, sheet: str | None) -> NumberTable:
     """Return the table on a sheet of a workbook; by default on that with the most rows of numbers."""
-    import openpyxl
-
+    try:
+        import openpyxl
+    except ModuleNotFoundError:
+        raise ModelError("is a spreadsheet, and the Python library openpyxl is missing; pip install openpyxl") from None
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             size = sum(member.file_size for member in archive.infolist())

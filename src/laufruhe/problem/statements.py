@@ -8,6 +8,7 @@ from __future__ import annotations
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Self
 
+from laufruhe.errors import optional_libraries
 from laufruhe.problem.measure import Measure
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ class Statements:
     """Methods of a problem that state it for other libraries, and that take own measures."""
 
     def _call(self, name: str, *arguments: Any) -> Any:
-        return resolve_name(_FUNCTIONS[name])(self, *arguments)
+        with optional_libraries():
+            return resolve_name(_FUNCTIONS[name])(self, *arguments)
 
     def _repr_html_(self) -> str:
         return str(self._call("html"))

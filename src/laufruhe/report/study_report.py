@@ -56,7 +56,9 @@ def write_study(
         name, data = part.name, datasets[part.name]
         # netCDF cannot mark a name with a space as a coordinate
         spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
-        data.rename(spaced).to_netcdf(folder / f"{name}.nc")
+        stored = data.rename(spaced).drop_dims([dim for dim, size in data.sizes.items() if not size])
+        stored.attrs = {key: _plain(value) for key, value in data.attrs.items()}
+        stored.to_netcdf(folder / f"{name}.nc", engine="scipy")
         if "csv" in part.ends:
             rows = _flat(data)
             tables[name] = Table([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
@@ -71,6 +73,13 @@ def write_study(
     pictures = {name: picture() for name, picture in pending.items()}
     files.write(folder / files.REPORT, document.as_markdown(ending))
     files.write(folder / files.PAGE, as_html(document, pictures))
+
+
+def _plain(value: Any) -> Any:
+    # netCDF-3 has numbers of 32 bits and no lists of texts
+    if isinstance(value, list) and any(isinstance(text, str) for text in value):
+        return ", ".join(map(str, value))
+    return str(value) if isinstance(value, int) and abs(value) >= 2**31 else value
 
 
 def study_document(

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
-from laufruhe.errors import ModelError, SolverError, wrong_call
+from laufruhe.errors import ModelError, SolverError, optional_libraries, wrong_call
 from laufruhe.extension import in_order
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
@@ -55,8 +55,6 @@ from laufruhe.solvers.stars.even_search import refuse_long
 from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
 from laufruhe.solvers.walk import check_by_walk
 
-OPTIONAL_PACKAGES = ("casadi", "clarabel", "cvxpy")
-"""Optional packages that some methods import."""
 TIME_LIMIT_NOTE = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
 _HERE = "laufruhe.solvers"
@@ -242,12 +240,8 @@ def solve(
         result: Result | None
         try:
             refuse(problem)
-            result = _solve_reduced(problem)
-        except ModuleNotFoundError as error:
-            if error.name not in OPTIONAL_PACKAGES:
-                raise
-            why = f"these open numbers need {error.name}, which is not installed; pip install {error.name}"
-            raise SolverError(why) from None
+            with optional_libraries():
+                result = _solve_reduced(problem)
         except SolverError:
             if not is_time_over():
                 raise

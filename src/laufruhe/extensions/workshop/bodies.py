@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
-from scipy.optimize import brentq, minimize_scalar
-
 from laufruhe.errors import ModelError
 from laufruhe.extensions.workshop.shapes import Shape
 
@@ -168,6 +166,8 @@ class BodyFit:
     @cached_property
     def _best_breadth(self) -> float | None:
         """Breadth with the largest first moment; None if the breadth is fixed."""
+        from scipy.optimize import minimize_scalar
+
         if self._breadths is None or self._is_free or self._is_one_radius:
             return None if self._breadths is None else self._breadths[1]
         low, high = self._breadths
@@ -221,6 +221,8 @@ class BodyFit:
 
 
 def _root(excess: Callable[[float], float], low: float, high: float) -> float:
+    from scipy.optimize import brentq
+
     # return the root of a growing function; an end if rounding leaves no change of sign
     if excess(low) >= 0.0:
         return low
