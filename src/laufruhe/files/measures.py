@@ -47,8 +47,8 @@ EDGES = (*SIDES, "outside")
 """Keys of the bounds of a limit."""
 # channels that need a stiffness independent of frequency
 _OF_CONSTANT_STIFFNESS = frozenset({
-    channels.FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL, channels.TORQUE_ROLL,
-    channels.RAW_TORQUE_ROLL,
+    channels.FREQUENCIES, channels.MOTION_FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL,
+    channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL,
 })  # fmt: skip
 _OF_OPEN_FREQUENCY = frozenset({channels.RAW_TORQUE_ROLL})
 _ROUNDING = 1e-9

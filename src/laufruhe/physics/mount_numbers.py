@@ -13,7 +13,7 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.modes import static_motion, torque_roll_axis, weight_wrench
+from laufruhe.physics.modes import Modes, static_motion, torque_roll_axis, weight_wrench
 
 
 def transmitted(forces: Spectrum, firm: Spectrum, orders: Sequence[float] | None) -> float:
@@ -40,6 +40,11 @@ def sag(mounting: ElasticMounting) -> float:
 def decoupling(energy: Any, motions: Sequence[int]) -> float:
     """Return the least energy share of a motion in its dominant mode (E7)."""
     return float(min(energy[motion].max() for motion in motions))
+
+
+def motion_frequencies(modes: Modes, motions: Sequence[int]) -> list[float]:
+    """Return the frequency of each motion's dominant mode, where its energy share is largest [Hz] (E6, E7)."""
+    return [float(modes.frequencies[modes.energy[motion].argmax()]) for motion in motions]
 
 
 def decoupling_shortfall(energy: Any, motions: Sequence[int], wanted: float) -> float:

@@ -460,6 +460,10 @@ FREQUENCIES = MountChannel(
     "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, depends_on_loads=False,
     values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
 )  # fmt: skip
+MOTION_FREQUENCIES = MountChannel(
+    "motion frequencies", "Hz", ("motions",), sides=("min", "max"), minimised=False, depends_on_loads=False,
+    values=_of_mounting(lambda mounting, m: mount_numbers.motion_frequencies(mounting.modes, motion_indices(m))),
+)  # fmt: skip
 DECOUPLING = MountChannel(
     "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, depends_on_loads=False,
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
@@ -477,8 +481,8 @@ TOTAL_STIFFNESS = MountChannel(
     values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
 )  # fmt: skip
 OF_MOUNTING = (
-    TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, DECOUPLING_SHORTFALL, TORQUE_ROLL, RAW_TORQUE_ROLL, TOTAL_STIFFNESS,
-    STATIC_TRAVEL, STATIC_FORCE,
+    TRANSMISSIBILITY, SAG, FREQUENCIES, MOTION_FREQUENCIES, DECOUPLING, DECOUPLING_SHORTFALL, TORQUE_ROLL,
+    RAW_TORQUE_ROLL, TOTAL_STIFFNESS, STATIC_TRAVEL, STATIC_FORCE,
 )  # fmt: skip
 
 

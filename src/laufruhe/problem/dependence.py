@@ -75,6 +75,7 @@ shaft clearance                     0 0 0  s 0 0  0  0 0  0
 envelope radius                     0 0 0  c 0 0  0  0 0  0
 static sag                          0 0 0  0 0 0  0  c s  0
 natural frequencies                 0 0 0  0 0 0  0  + s  0
+motion frequencies                  0 0 0  0 0 0  0  ? ?  0
 kinetic-energy decoupling           0 0 0  0 0 0  0  s s  0
 decoupling shortfall                0 0 0  0 0 0  0  s s  0
 torque-roll residual                0 0 0  0 0 0  0  c s  0

@@ -70,11 +70,11 @@ QuantityName: TypeAlias = Literal[
     "worst mean shaft torque", "rmq shaft torque", "mean shaft stress", "maximum shaft stress", "rms shaft stress",
     "peak to peak shaft stress", "worst mean shaft stress", "rmq shaft stress", "degree of irregularity",
     "flywheel inertia", "flywheel mass", "rim stress", "arm stress", "counterweight mass", "balancer mass",
-    "added mass", "transmissibility", "static sag", "natural frequencies", "kinetic-energy decoupling",
-    "decoupling shortfall", "torque-roll residual", "raw torque-roll residual", "total stiffness", "static travel",
-    "static mount force", "shaft distance", "shaft clearance", "envelope radius", "apex speed", "apex acceleration",
-    "run-up force", "run-up travel", "run-up twist", "throw clearance", "running-gear mass", "torsional frequencies",
-    "critical speeds", "absorber heat",
+    "added mass", "transmissibility", "static sag", "natural frequencies", "motion frequencies",
+    "kinetic-energy decoupling", "decoupling shortfall", "torque-roll residual", "raw torque-roll residual",
+    "total stiffness", "static travel", "static mount force", "shaft distance", "shaft clearance", "envelope radius",
+    "apex speed", "apex acceleration", "run-up force", "run-up travel", "run-up twist", "throw clearance",
+    "running-gear mass", "torsional frequencies", "critical speeds", "absorber heat",
 ] | str
 """Quantities that may be minimised or limited; those of extensions of users are texts."""
 

@@ -67,6 +67,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "constraints": [
             {
                 **_attributes(limit, "name value error_estimate limit side unit active"),
+                **({"window": list(limit.window)} if limit.window else {}),
                 "met": is_met(limit),
                 "shadow_price": limit.shadow_price if proof else None,
                 "tightening_price": limit.price.tightened if proof else None,

@@ -414,9 +414,10 @@ def _limit_value(
     minimum = price_floor * value / abs(standing.edge) if standing.edge else 0.0
     price = price.floored(minimum) if active else Price(0.0, 0.0)
     error = relative(measure_sampling_error(limit.measure, evaluation), standing.value)
+    window = limit.minimum, limit.maximum
     return LimitValue(
         limit.name, standing.value, standing.edge, limit.measure.unit, active, price.relaxed, standing.side, error,
-        price.other,
+        price.other, window if all(map(math.isfinite, window)) else None,
     )  # fmt: skip
 
 

@@ -126,6 +126,8 @@ class LimitValue(_Priced):
         Fall of the objective per unit by which the limit is relaxed; NaN if unknown.
     error_estimate
         Upper bound of the relative error of the value from sampling.
+    window
+        Smallest and largest value allowed, if there are both; `limit` is the nearer one.
     tightening_price
         Rise of the objective per unit by which the limit is tightened; None if equal to `shadow_price`, infinite if no
         design remains.
@@ -140,6 +142,7 @@ class LimitValue(_Priced):
     side: str = "at most"
     error_estimate: float = 0.0
     tightening_price: float | None = None
+    window: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ def _decision(before: DecisionValue | None, d: DecisionValue, unit: str) -> tupl
 def limits(result: Result) -> list[Table]:
     """Return a table of the limits: value, bound and shadow price, a row for each."""
     values, decided, unit = limits_of(result), result.certificate is not None, objective_unit(result)
-    sides = {limit.side for limit in values}
+    sides = {"bound" if limit.window else limit.side for limit in values}
     head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
     title = "Limits" if is_changed(result) else "Limits, for the initial design"
     notes = [PRICES] if decided and any(limit.shadow_price or limit.tightening_price for limit in values) else []
@@ -90,6 +90,9 @@ def _limit(limit: LimitValue, unit: str, decided: bool) -> tuple[str, ...]:
     state = "broken" if not is_met(limit) else "active" if limit.active else "slack"
     value = f"{number(limit.value * factor, scale=limit.limit * factor)} {name}"
     bound = ("" if limit.side == "at most" else f"{limit.side} ") + with_unit(limit.limit, limit.unit)
+    if limit.window:
+        low, high = (trimmed(edge * factor) for edge in limit.window)
+        bound = f"{low} to {high} {name}"
     return limit.name, value, bound, state, prices_of(limit, unit, limit.active) if decided else DASH
 
 
