@@ -22,7 +22,8 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Seiliger, SliderCrank, TrappedCharge, Wiebe
+from laufruhe.machine.chambers import CylinderGases
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.roots import rising_root
 from laufruhe.numerics.spectrum import Spectrum
@@ -32,8 +33,9 @@ from laufruhe.physics.gravity import with_gravity
 from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, reduced, resolved_orders, two_order_roll
 from laufruhe.physics.rigid_body import ROLL
+from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.star_loads import star_loads
-from laufruhe.physics.uneven_speed import driving_torque, moving_inertia, start_energy
+from laufruhe.physics.uneven_speed import driving_torque, gas_torque, moving_inertia, start_energy
 
 FINE_WORK = 8
 """Times as many steps as the fidelity has, at which the work is compared."""
@@ -57,6 +59,41 @@ class TorqueFacts:
     largest: float
     excursion: float
     irregularity: float | None
+
+
+@dataclass(frozen=True)
+class TurningTorque:
+    """Largest torque that turns the crank slowly [N m], and the crank angle at which it is needed [rad] (T15)."""
+
+    torque: float
+    angle: float
+
+
+def turning_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> TurningTorque | None:
+    """Return the largest torque against compression and weights, without combustion and friction (T15).
+
+    It is None for gas whose pressure without combustion is not known.
+    """
+    try:
+        gas = _unfired(fidelity.gas_of(point), engine.cycle)
+    except LookupError:
+        return None
+    still = with_gravity(gas_torque(engine, replace(point, gas=gas), fidelity), engine, fidelity)
+    steps = FINE_WORK * fidelity.samples
+    angles = np.concatenate([engine.cycle.angle * np.arange(steps) / steps, still.kink_angles])
+    needed = -np.concatenate([still.sample(steps), still.values(still.kink_angles)])
+    k = int(np.argmax(needed))
+    return TurningTorque(max(float(needed[k]), 0.0), float(angles[k]))
+
+
+def _unfired(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
+    if isinstance(gas, CylinderGases):
+        return gas.mapped(lambda one: _unfired(one, cycle))  # type: ignore[arg-type, return-value]
+    if gas is None or isinstance(gas, TrappedCharge):
+        return gas
+    if isinstance(gas, Seiliger | Wiebe):
+        return motored_cycle(gas, cycle)
+    raise LookupError("pressure without combustion")
 
 
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:

@@ -17,7 +17,7 @@ from laufruhe.physics.gas_facts import gas_facts
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.physics.static_cases import settled
-from laufruhe.physics.torque import torque_facts
+from laufruhe.physics.torque import torque_facts, turning_torque
 from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.channels import LoadChannel, mounting_in
@@ -127,6 +127,7 @@ def _objective(result: Result) -> Record | None:
 
 def _point(result: Result, k: int) -> Record:
     point, final = result.problem.points[k], result.final
+    turning = turning_torque(final.engine, point, result.problem.fidelity)
     facts = torque_facts(final.engine, point, result.problem.fidelity)
     gas = gas_facts(final.engine, point, result.problem.fidelity)
     return {
@@ -134,7 +135,8 @@ def _point(result: Result, k: int) -> Record:
         "mounts": [],
         **{places.key: _places(result, k, places.channel) for places in places_of(result)},
         "shaking": _shaking(final.loads[k].wrench),
-        "torque": _attributes(facts, "mean power least=minimum largest excursion irregularity"),
+        "torque": _attributes(facts, "mean power least=minimum largest excursion irregularity")
+        | {"turning": turning and asdict(turning)},
         **({"gas": {**asdict(gas), "recording": list(gas.recording)}} if gas else {}),
     }
 

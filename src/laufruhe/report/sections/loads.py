@@ -9,7 +9,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_forces import CycleMeasures
-from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, turning_inertia
+from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, turning_inertia, turning_torque
 from laufruhe.present.gas_figures import HEAD, gas_note, gas_rows
 from laufruhe.present.measures import (
     Places,
@@ -36,7 +36,8 @@ from laufruhe.units import readable
 MAX_ORDERS, SHARE = 8, 0.005
 TORQUE = (
     "Torque of gas, pistons and rods, without friction. Stored: energy that the flywheel must store. "
-    "Irregularity: largest less smallest speed over the mean."
+    "Irregularity: largest less smallest speed over the mean. To turn: largest torque that turns the crank slowly, "
+    "without combustion and friction."
 )
 EVEN = (
     "Speeds at which this flywheel keeps the limit with the same torque of gas and load; the ranges are proven (T13)."
@@ -126,8 +127,14 @@ def torque(result: Result) -> list[Table]:
     engine, problem = result.final.engine, result.problem
     if not uses_torque(result):
         return []
-    rows = [(point.name, *_torque_cells(torque_facts(engine, point, problem.fidelity))) for point in problem.points]
-    head = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity")
+    rows = []
+    for point in problem.points:
+        cells = _torque_cells(torque_facts(engine, point, problem.fidelity))
+        turning = turning_torque(engine, point, problem.fidelity)
+        rows.append((point.name, *cells, DASH if turning is None else number(turning.torque)))
+    head = (
+        "at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity", "to turn [N m]"
+    )  # fmt: skip
     return [
         Table(head, rows, title="Torque of the crankshaft", note=TORQUE, file="crankshaft-torque"),
         *_even_speeds(result),
