@@ -23,6 +23,7 @@ from laufruhe.prove.certificate import (
     Proof,
     ProofStrength,
     best_bound,
+    gap_of,
     kkt_residual,
     lower_bound,
     make_certificate,
@@ -111,6 +112,10 @@ class TestGap:
         found = make_certificate(2.0, 1.5, 1e-9, 1e-4, ProofStrength.EXACT, 0.0, "")
         assert found.gap == pytest.approx(0.25)
         assert found.kind is Proof.WITHIN_GAP
+
+    @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+    def test_is_the_same_share_in_every_unit(self, unit: float) -> None:
+        assert gap_of(2.0 * unit, 1.5 * unit, 0.0) == pytest.approx(0.25)
 
     def test_what_is_nothing_beside_the_loads_counts_as_zero(self) -> None:
         assert make_certificate(1e-10, 0.0, 1e-9, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.GLOBAL
