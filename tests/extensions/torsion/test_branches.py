@@ -219,6 +219,10 @@ def test_branch_of_a_file() -> None:
     assert gain == pytest.approx(0.004 * 6.25)
     inertias = [turning_inertia(e, without.fidelity) or 0.0 for e in (engine, without.engine)]
     assert inertias[0] - inertias[1] == pytest.approx(0.024 * 6.25)
+    # a gear of no mass
+    file["torsion"]["branches"] = [{key: value for key, value in BRANCH.items() if key != "gear_inertia"}]
+    plain = chain_of(laufruhe.load(file).engine)
+    assert plain.discs[plain.driven].inertia == pytest.approx(chain_of(without.engine).discs[-1].inertia)
 
 
 @pytest.mark.parametrize(("key", "value", "text"), [
