@@ -39,6 +39,7 @@ _CHOICES = {
     "fuel": ("petrol", "diesel", "none"),
 }
 """Answers to questions that have few of them."""
+_USUAL_LAYOUTS = ("inline", "vee", "boxer")
 _LAYOUT_REMEDY = "use inline, vee or boxer, or a name such as V8, flat four or 270 twin"
 
 
@@ -208,7 +209,7 @@ def _layout(key: str, text: str, _: Answers) -> Answers:
         layout, count = trade_value("layout", word), trade_value("cylinders", word)
         if word.isdigit():
             (angles if degrees or int(word) > _MOST_CYLINDERS else counts).append(int(word))
-        elif layout in ("inline", "vee", "boxer"):
+        elif layout in _USUAL_LAYOUTS:
             layouts.append(layout)
         elif count:
             counts.append(int(count))
@@ -217,7 +218,7 @@ def _layout(key: str, text: str, _: Answers) -> Answers:
     if (not layouts and not counts) or len(set(layouts)) > 1 or len(counts) > 1 or len(angles) > 1:
         raise refused(key, text, "is not one layout", _LAYOUT_REMEDY)
     layout = layouts[0] if layouts else "inline"
-    angle = "engine.bank_angle" if layout == "vee" else "first interval"
+    angle = "engine.bank_angle" if LAYOUTS[layout].takes("bank_angle") else "first interval"
     named = {"engine.cylinders": counts, angle: angles}
     return {key: layout, **{name: numbers[0] for name, numbers in named.items() if numbers}}
 
@@ -302,7 +303,7 @@ def _has_banks(answers: Answers) -> bool:
 
 
 def _is_vee(answers: Answers) -> bool:
-    return bool(answers["engine.layout"] == "vee")
+    return _kind(answers).takes("bank_angle")
 
 
 def _has_throws(answers: Answers) -> bool:
@@ -355,7 +356,7 @@ _LAYOUT = (
               _has_banks),
     _Question("engine.firing_intervals", "Firing intervals [deg], even or as in 270-450",
               lambda answers: f"{answers.get('first interval', 'even')}", _intervals,
-              lambda answers: _has_throws(answers) and answers["engine.layout"] != "boxer"),
+              lambda answers: _has_throws(answers) and (_is_vee(answers) or not _has_banks(answers))),
     _Question("engine.firing_order", "Firing order (or - to enter the angles of the throws)",
               lambda answers: "1-2" if _count(answers) == 2 else "", _order, _has_throws),
     _Question("engine.throws", "Angles of the throws from front to rear [deg], as in 0, 180, 180, 0", "", _throws,
