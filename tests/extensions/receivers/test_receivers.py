@@ -14,7 +14,7 @@ from attack.families import toml
 from extensions.receivers import tractor_seat
 from extensions.receivers.felt import Felt, draw, functions
 from lanes import first_fast
-from laufruhe.errors import InputError
+from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.receivers.section import SECTION
 from laufruhe.plots import figure
 from laufruhe.problem.evaluation import evaluate
@@ -111,6 +111,18 @@ def test_signals_are_affine_in_weights_and_masses(tmp_path: Path) -> None:
     )
     middle, a, b = (d.signals(channel)[0].coefficients for d in (evaluate(problem, engine), first, last))
     assert middle == pytest.approx(0.5 * (a + b), rel=1e-9, abs=1e-9 * np.abs(middle).max())
+
+
+@pytest.mark.parametrize("mounts", ["rigid", "time"])
+@pytest.mark.parametrize("with_frame", [False, True])
+def test_motion_needs_mounts_in_the_frequency_domain(mounts: str, with_frame: bool, tmp_path: Path) -> None:
+    table = plain(tmp_path)
+    table["fidelity"], table["receivers"] = {"mounts": mounts}, table["receivers"][:1]
+    table["objective"] = {"minimise": "rms receiver acceleration"}
+    if not with_frame:
+        del table["frame"]
+    with pytest.raises(ModelError, match="needs mounts in the frequency domain"):
+        laufruhe.evaluate(laufruhe.load(written(table, tmp_path)))
 
 
 def test_open_mounts_give_a_local_optimum_without_a_bound(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.receivers.machine import Frame, Quantity, Receiver, Receivers, receivers_of
@@ -101,9 +102,6 @@ def _of_point(receiver: Receiver, frame: Frame | None, engine: Engine, loads: Po
         mounting, body = mounting_of(engine, loads.fidelity), engine.block
         if isinstance(mounting, ElasticMounting):
             motion = mounting.responses(omegas, wrenches) @ mounting.modes.shapes.T
-        elif loads.fidelity.mounts == "rigid":
-            # elastic mounts that are taken for rigid do not travel
-            motion = np.zeros(wrenches.shape, dtype=complex)
         else:
             raise ModelError(f"receiver '{receiver.name}' {_IN_FREQUENCY}")
     if body is None or receiver.point is None:
@@ -147,24 +145,23 @@ class _Coupled:
 
     def solved(self, omegas: Array, wrenches: ComplexArray) -> _Motion:
         """Return the motion under wrenches about the origin, shape (n, 6), at positive angular frequencies [rad/s]."""
-        mounting, frame, count = self.mounting, self.frame, self.shapes.shape[1]
-        springs = self._springs(omegas)
-        places = [mount.position for mount in mounting.mounts]
-        of_engine = np.concatenate(list(mounting.motions)) @ self.shapes
-        of_frame = np.concatenate([_motion_at(place, frame.body.centre_of_gravity) for place in places])
-        # deflection of every mount per motion of both bodies
-        stretch = np.concatenate([of_engine, -of_frame], axis=1)
-        inertia = np.zeros((count + 6, count + 6))
-        inertia[:count, :count] = self.shapes.T @ mounting.block.mass_matrix @ self.shapes
-        inertia[count:, count:] = frame.body.mass_matrix
-        impedance = stretch.T @ springs @ stretch - omegas[:, None, None] ** 2 * inertia
-        for spring in frame.springs:
-            motion = _motion_at(spring.position, frame.body.centre_of_gravity)
-            elastic, lossy, viscous = (
-                carried(motion, matrix)
-                for matrix in (spring.stiffness_matrix, spring.loss_matrix, spring.damping_matrix)
-            )
-            impedance[:, count:, count:] += elastic + 1j * lossy + 1j * omegas[:, None, None] * viscous
+        mounting, centre, count = self.mounting, self.frame.body.centre_of_gravity, self.shapes.shape[1]
+        feet = np.concatenate([_motion_at(mount.position, centre) for mount in mounting.mounts])
+        # travel of every mount per motion of both bodies
+        travels = np.concatenate([np.concatenate(list(mounting.motions)) @ self.shapes, -feet], axis=1)
+        inertia = block_diag(self.shapes.T @ mounting.block.mass_matrix @ self.shapes, self.frame.body.mass_matrix)
+        lossy = block_diag(*mounting.springs) + 1j * block_diag(*mounting.losses)
+        viscous = 1j * block_diag(*mounting.dampers)
+        still, moving = (travels.T @ part @ travels for part in (lossy, viscous))
+        for spring in self.frame.springs:
+            at = _motion_at(spring.position, centre)
+            still[count:, count:] += carried(at, spring.stiffness_matrix + 1j * spring.loss_matrix)
+            moving[count:, count:] += 1j * carried(at, spring.damping_matrix)
+        w = omegas[:, None, None]
+        impedance = still + w * moving - w**2 * inertia
+        laws, axes = mounting.dynamic, mounting.dynamic.directions
+        if laws:
+            impedance += np.einsum("wn,ni,nj->wij", laws.added(omegas), axes.T @ travels, axes.T @ travels)
         drive = np.zeros((len(omegas), count + 6), dtype=complex)
         drive[:, :count] = wrenches @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity).T @ self.shapes
         try:
@@ -174,18 +171,8 @@ class _Coupled:
                 "engine and frame are driven at a natural frequency and nothing damps it; give mounts or frame a loss "
                 "factor or damping"
             ) from None
-        forces = np.einsum("nij,nj->ni", springs @ stretch, moved)
+        travel = moved @ travels.T
+        forces = travel @ lossy.T + omegas[:, None] * (travel @ viscous.T)
+        if laws:
+            forces += (laws.added(omegas) * (travel @ axes)) @ axes.T
         return _Motion(moved[:, :count] @ self.shapes.T, moved[:, count:], np.asarray(forces))
-
-    def _springs(self, omegas: Array) -> ComplexArray:
-        """Return the complex stiffness of all mounts, shape (n, 3 mounts, 3 mounts) [N/m]."""
-        mounting, size = self.mounting, 3 * len(self.mounting.mounts)
-        total = np.zeros((len(omegas), size, size), dtype=complex)
-        for k in range(len(mounting.mounts)):
-            part = slice(3 * k, 3 * k + 3)
-            total[:, part, part] = mounting.springs[k] + 1j * mounting.losses[k]
-            total[:, part, part] += 1j * omegas[:, None, None] * mounting.dampers[k]
-        if mounting.dynamic:
-            axes = mounting.dynamic.directions
-            total += np.einsum("rd,nd,sd->nrs", axes, mounting.dynamic.added(omegas), axes)
-        return total
