@@ -8,13 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.extensions.workshop.outlines import Arc, Line, Outline, Piece, corners_of
+from laufruhe.extensions.workshop.outlines import Arc, Line, Outline
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 
 TOLERANCE = 1e-6
 """Accuracy of a least distance [m]."""
-FINE = 0.02
-"""Angle between points of an arc where only inside and outside matter [rad]."""
 _FIRST, _PARTS, _MAX_ANGLES = 72, 4, 2048
 
 
@@ -24,41 +22,56 @@ def distance_to_polygon(outline: Outline, corners: ComplexArray) -> Array:
     `corners` has shape (k, n): one corner is a point, two are the ends of a line (H6).
     """
     starts, ends = (corners, np.roll(corners, -1, axis=0)) if len(corners) > 2 else (corners[:1], corners[-1:])
-    nearest = np.min([_to_piece(piece, starts, ends) for piece in outline], axis=0)
-    body = corners_of(outline, FINE)
-    is_inside = _is_within(body[:, None], corners[0])
-    if len(corners) > 2:
-        is_inside = is_inside | _is_within(corners, np.full(corners.shape[1], body[0]))
-    distances: Array = np.where(is_inside | (nearest == 0.0), -np.inf, nearest)
-    return distances
-
-
-def _to_piece(piece: Piece, starts: ComplexArray, ends: ComplexArray) -> Array:
-    """Return the distance of a piece from the nearest of some lines, shape (n,); lines have shape (k, n)."""
-    from_ends = np.minimum(_to_line(piece.start, starts, ends), _to_line(piece.end, starts, ends))
-    if isinstance(piece, Line):
-        a, b = np.asarray(piece.start), np.asarray(piece.end)
-        from_corners = np.minimum(_to_line(starts, a, b), _to_line(ends, a, b))
+    own = np.array([piece.start for piece in outline])
+    lines = np.array([(piece.start, piece.end) for piece in outline if isinstance(piece, Line)])
+    arcs = [piece for piece in outline if isinstance(piece, Arc)]
+    # pieces, sides and polygons are the axes
+    distances = [_to_line(own[:, None, None], starts, ends)]
+    if len(lines):
+        a, b = lines.T[:, :, None, None]
         crosses = (_side(a, b, starts) * _side(a, b, ends) < 0.0) & (
             _side(starts, ends, a) * _side(starts, ends, b) < 0.0
         )
-        return np.asarray(np.where(crosses, 0.0, np.minimum(from_ends, from_corners)).min(axis=0))
+        distances += [_to_line(corners, a, b), np.where(crosses, 0.0, np.inf)]
+    if arcs:
+        distances += _to_arcs(arcs, corners, starts, ends)
+    nearest = np.min([part.min(axis=(0, 1)) for part in distances], axis=0)
+    is_inside = _is_within(own[:, None], corners[0])
+    for arc in arcs:
+        # the outline is its chords, and a segment beyond or within the chord of every arc
+        is_inside ^= _is_in_segment(arc, corners[0])
+    if len(corners) > 2:
+        is_inside |= _is_within(corners, np.full(corners.shape[1], own[0]))
+    return np.where(is_inside | (nearest == 0.0), -np.inf, nearest)
+
+
+def _to_arcs(arcs: Sequence[Arc], corners: ComplexArray, starts: ComplexArray, ends: ComplexArray) -> list[Array]:
+    """Return distances between the inner points of arcs and the corners and sides of polygons; 0 where they cross."""
+    centre = np.array([arc.centre for arc in arcs])[:, None, None]
+    radius, half = (np.array(sizes)[:, None, None] for sizes in
+                    ([arc.radius for arc in arcs], [0.5 * abs(arc.turn) for arc in arcs]))  # fmt: skip
+    middle = np.exp(1j * np.array([arc.first_angle + 0.5 * arc.turn for arc in arcs]))[:, None, None]
+
+    def faces(points: ComplexArray) -> Mask:
+        return np.asarray(np.abs(np.angle((points - centre) * middle.conj())) <= half)
+
+    def distance(points: ComplexArray) -> Array:
+        return np.where(faces(points), np.abs(np.abs(points - centre) - radius), np.inf)
+
     along, length = ends - starts, np.abs(ends - starts)
     unit = along / np.where(length == 0.0, 1.0, length)
-    # coordinates of the centre along and across each line
-    offset = (piece.centre - starts) * unit.conj()
+    # coordinates of the centre along and across each side
+    offset = (centre - starts) * unit.conj()
     foot = starts + unit * np.clip(offset.real, 0.0, length)
-    distances = [from_ends, *(_to_arc(piece, points) for points in (starts, ends, foot))]
-    half = np.sqrt(np.maximum(piece.radius**2 - offset.imag**2, 0.0))
-    crosses = np.zeros(starts.shape, dtype=bool)
-    for side in (-half, half):
-        reach = offset.real + side
-        is_on_line = (reach >= 0.0) & (reach <= length) & (np.abs(offset.imag) < piece.radius)
-        crosses |= is_on_line & _faces(piece, starts + unit * reach)
-    return np.asarray(np.where(crosses, 0.0, np.minimum.reduce(distances)).min(axis=0))
+    chord = np.sqrt(np.maximum(radius**2 - offset.imag**2, 0.0))
+    crosses = np.zeros(offset.shape, dtype=bool)
+    for reach in (offset.real - chord, offset.real + chord):
+        is_on_side = (reach >= 0.0) & (reach <= length) & (np.abs(offset.imag) < radius)
+        crosses |= is_on_side & faces(starts + unit * reach)
+    return [distance(corners), distance(foot), np.where(crosses, 0.0, np.inf)]
 
 
-def _to_line(point: ComplexArray | complex, start: ComplexArray, end: ComplexArray) -> Array:
+def _to_line(point: ComplexArray, start: ComplexArray, end: ComplexArray) -> Array:
     along = end - start
     squared = np.maximum(np.abs(along) ** 2, 1e-300)
     share = np.clip(((point - start) * along.conj()).real / squared, 0.0, 1.0)
@@ -71,15 +84,13 @@ def _side(start: ComplexArray, end: ComplexArray, point: ComplexArray) -> Array:
     return areas
 
 
-def _faces(arc: Arc, points: ComplexArray) -> Mask:
-    # the direction from the centre lies within the arc
-    turned = np.angle((points - arc.centre) * np.exp(-1j * (arc.first_angle + 0.5 * arc.turn)))
-    return np.asarray(np.abs(turned) <= 0.5 * abs(arc.turn))
-
-
-def _to_arc(arc: Arc, points: ComplexArray) -> Array:
-    ends = np.minimum(np.abs(points - arc.start), np.abs(points - arc.end))
-    return np.where(_faces(arc, points), np.abs(np.abs(points - arc.centre) - arc.radius), ends)
+def _is_in_segment(arc: Arc, points: ComplexArray) -> Mask:
+    # the points between an arc and its chord
+    from_centre = points - arc.centre
+    beyond = (from_centre * np.exp(-1j * (arc.first_angle + 0.5 * arc.turn))).real - arc.radius * math.cos(
+        0.5 * arc.turn
+    )
+    return np.asarray((np.abs(from_centre) < arc.radius) & (beyond > 0.0))
 
 
 def _is_within(polygon: ComplexArray, points: ComplexArray) -> Mask:
