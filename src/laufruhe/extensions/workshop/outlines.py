@@ -112,7 +112,7 @@ def rounded(outline: Outline, radius: float) -> Outline:
     pieces, arcs = list(outline), dict[int, Arc]()
     for k in range(len(pieces)):
         before, after = outline[k - 1], outline[k]
-        inside = (_heading(before, at_end=True).conjugate() * _heading(after, at_end=False)).imag
+        inside = (heading(before, at_end=True).conjugate() * heading(after, at_end=False)).imag
         if inside > 1e-9:
             arcs[k] = _fillet(before, after, radius)
     for k, arc in arcs.items():
@@ -121,7 +121,8 @@ def rounded(outline: Outline, radius: float) -> Outline:
     return tuple(piece for k, part in enumerate(pieces) for piece in ((arcs[k], part) if k in arcs else (part,)))
 
 
-def _heading(piece: Piece, at_end: bool) -> complex:
+def heading(piece: Piece, at_end: bool) -> complex:
+    """Return the direction of a piece at its end or start, of length one."""
     if isinstance(piece, Line):
         return (piece.end - piece.start) / abs(piece.end - piece.start)
     angle = piece.first_angle + (piece.turn if at_end else 0.0)
@@ -142,7 +143,7 @@ def _fillet(before: Piece, after: Piece, radius: float) -> Arc:
 
 def _inward(piece: Piece, distance: float) -> Piece:
     if isinstance(piece, Line):
-        shift = 1j * _heading(piece, True) * distance
+        shift = 1j * heading(piece, True) * distance
         return Line(piece.start + shift, piece.end + shift)
     radius = piece.radius - math.copysign(distance, piece.turn)
     return Arc(piece.centre, max(radius, 0.0), piece.first_angle, piece.turn)
@@ -153,10 +154,10 @@ def _common(one: Piece, other: Piece) -> list[complex]:
     if isinstance(one, Arc) and isinstance(other, Line):
         return _common(other, one)
     if isinstance(one, Line):
-        along = _heading(one, True)
+        along = heading(one, True)
         if isinstance(other, Line):
-            across = (along.conjugate() * _heading(other, True)).imag
-            reach = ((other.start - one.start).conjugate() * _heading(other, True)).imag / across
+            across = (along.conjugate() * heading(other, True)).imag
+            reach = ((other.start - one.start).conjugate() * heading(other, True)).imag / across
             return [one.start + reach * along]
         offset = (other.centre - one.start) / along
         half = other.radius**2 - offset.imag**2
@@ -175,7 +176,7 @@ def _common(one: Piece, other: Piece) -> list[complex]:
 
 def _foot(piece: Piece, point: complex) -> complex:
     if isinstance(piece, Line):
-        along = _heading(piece, True)
+        along = heading(piece, True)
         return piece.start + along * ((point - piece.start) / along).real
     outwards = point - piece.centre
     return piece.centre + piece.radius * outwards / abs(outwards)

@@ -8,10 +8,47 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeAlias
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.workshop.outlines import Arc, Line, Moments, Outline, moments, rounded
+
+
+@dataclass(frozen=True)
+class Along:
+    """Dimension from the shaft along the middle of a shape; negative to the other side [m]."""
+
+    distance: float
+
+
+@dataclass(frozen=True)
+class Across:
+    """Dimension of a width across the middle of a shape, at a distance from the shaft [m]."""
+
+    place: float
+    width: float
+
+
+@dataclass(frozen=True)
+class Opening:
+    """Dimension of an opening angle about the shaft, outside a radius [m]."""
+
+    radius: float
+    angle: float
+
+
+@dataclass(frozen=True)
+class Round:
+    """Dimension of a radius about the shaft [m], stated at an angle; hollow if the arrow comes from the shaft."""
+
+    radius: float
+    angle: float
+    is_hollow: bool = False
+
+
+Dimension: TypeAlias = Along | Across | Opening | Round
+_STATED, _STEEPEST = 0.55, 1.1
+"""Share of half an arc at which its radius is stated, and the largest such angle [rad]."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +80,11 @@ class Shape(ABC):
 
     @abstractmethod
     def _sharp_outline(self) -> Outline: ...
+
+    @property
+    @abstractmethod
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """Dimensions of a drawing, without fillets and thickness."""
 
     @cached_property
     def moments(self) -> Moments:
@@ -89,6 +131,13 @@ class Sector(Shape):
         inside = (Arc(0j, low, half, -self.angle),) if low else ()
         return (Line(low * start, high * start), Arc(0j, high, -half, self.angle), Line(high * end, low * end), *inside)
 
+    @property
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """Dimensions of a drawing, without fillets and thickness."""
+        half = 0.5 * self.angle
+        inside = (Round(self.inner_radius, -min(0.75 * half, _STEEPEST), True),) if self.inner_radius else ()
+        return _outer(self.outer_radius, half), *inside, Opening(self.outer_radius, self.angle)
+
 
 @dataclass(frozen=True)
 class Slab(Shape):
@@ -113,6 +162,16 @@ class Slab(Shape):
         turn, top = 2.0 * math.asin(half / high), math.sqrt(high**2 - half**2)
         right, left = Line(complex(low, -half), complex(top, -half)), Line(complex(top, half), complex(low, half))
         return right, Arc(0j, high, -0.5 * turn, turn), left, Line(complex(low, half), complex(low, -half))
+
+    @property
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """Dimensions of a drawing, without fillets and thickness."""
+        low, high = self.inner_radius, self.outer_radius
+        full = math.sqrt(high**2 - low**2)
+        half = full if self.width is None else min(0.5 * self.width, full)
+        flat = (Along(low),) if low else ()
+        sides = (Across(math.sqrt(high**2 - half**2), 2.0 * half),) if half < full else ()
+        return _outer(high, math.asin(half / high)), *flat, *sides
 
 
 @dataclass(frozen=True)
@@ -151,8 +210,22 @@ class Cheek(Shape):
         sides = Line(complex(back, -half), foot.conjugate()), Line(foot, complex(back, half))
         return sides[0], *rim, sides[1], Arc(complex(back), half, 0.5 * math.pi, math.pi)
 
+    @property
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """Dimensions of a drawing, without fillets and thickness."""
+        half, flare = 0.5 * self.width, 0.5 * (self.angle or 0.0)
+        is_wide = self.outer_radius * math.sin(flare) > half
+        end = flare if is_wide else math.asin(half / self.outer_radius)
+        opening = (Opening(self.outer_radius, 2.0 * flare),) if is_wide else ()
+        plate = Along(-self.tail), Across(half - self.tail, self.width)
+        return _outer(self.outer_radius, end), *plate, *opening
+
 
 SHAPES: Mapping[str, type[Shape]] = {shape.name: shape for shape in (Sector, Slab, Cheek)}
+
+
+def _outer(radius: float, half: float) -> Round:
+    return Round(radius, min(_STATED * half, _STEEPEST))
 
 
 def _mm(length: float) -> str:
