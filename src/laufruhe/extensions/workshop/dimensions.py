@@ -13,7 +13,7 @@ LETTER, ARROW, LANDING = 2.5, 2.5, 16.0
 """Height of letters, length of arrowheads, and length of the line beneath the text of a radius."""
 DECIMALS = 2
 _OFF, _BEYOND = 1.0, 1.5
-_SLENDER = 0.16
+_SLENDER, _LETTER_WIDTH = 0.16, 0.85
 
 
 @dataclass(frozen=True)
@@ -70,13 +70,20 @@ class Distance:
             away = (foot - point) / (abs(foot - point) or 1.0)
             pieces.append(Line(point + _OFF * away, foot + _BEYOND * away))
             feet.append(foot)
-        low, high = sorted(feet, key=lambda foot: (foot * along.conjugate()).real)
+        low, high = sorted(feet, key=lambda foot: foot.real + foot.imag)
         length = abs(high - low)
-        # arrows come from outside where there is no room within
+        text = size_text(length / scale)
+        room = _LETTER_WIDTH * LETTER * len(text)
+        # arrows come from outside where there is no room within, and the text stands beyond a short line
         sign = 1.0 if length >= 3.0 * ARROW else -1.0
         beyond = 0j if sign > 0.0 else 2.5 * ARROW * along
-        pieces.append(Line(low - beyond, high + beyond))
-        text, place = size_text(length / scale), 0.5 * (low + high) + 0.9j * along * LETTER
+        ends, place = [low - beyond, high + beyond], 0.5 * (low + high)
+        if length < room + (2.0 * ARROW if sign > 0.0 else _BEYOND):
+            side = int(feet[1] == high)
+            away = (2.0 * side - 1.0) * along
+            place, ends[side] = ends[side] + 0.5 * room * away, ends[side] + room * away
+        pieces.append(Line(*ends))
+        place += 0.9j * along * LETTER
         angle = cmath.phase(along)
         heads = Arrowhead(low, -sign * along), Arrowhead(high, sign * along)
         return Marks(tuple(pieces), heads, Words(place, text, is_centred=True, angle=angle))

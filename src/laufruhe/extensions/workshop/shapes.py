@@ -135,7 +135,7 @@ class Sector(Shape):
     def dimensions(self) -> tuple[Dimension, ...]:
         """Dimensions of a drawing, without fillets and thickness."""
         half = 0.5 * self.angle
-        inside = (Round(self.inner_radius, -min(0.75 * half, _STEEPEST), True),) if self.inner_radius else ()
+        inside = (Round(self.inner_radius, -0.5 * min(half, math.pi - half), True),) if self.inner_radius else ()
         return _outer(self.outer_radius, half), *inside, Opening(self.outer_radius, self.angle)
 
 

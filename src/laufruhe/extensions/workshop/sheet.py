@@ -107,7 +107,9 @@ def _laid_out(engine: Engine, weight: Weight, title: str, scale: float) -> tuple
     dimensions = _of_front(weight, outline, factor, (left, bottom, top))
     above = sum(isinstance(one, Distance) and one.base.imag > top for one in dimensions)
     along, said = _direction(engine, weight)
-    reach = max(float((points * along.conjugate()).real.max()), 3.0) + 3.0 + GAP * above
+    leaders = (one.elbow for one in dimensions if isinstance(one, Radius) and 0.0 <= one.elbow.real < ROW)
+    reach = max(float((points * along.conjugate()).real.max()) + 3.0 + (GAP + 5.0) * above, 6.0,
+                *(elbow.imag + 2.0 * LETTER for elbow in leaders))  # fmt: skip
     arrow = Arrowhead((reach + 14.0) * along, along, 1.6)
     centre = body.shape.lever * factor
     strokes = [
@@ -145,14 +147,10 @@ def _ends(dimensions: Sequence[Dimension], strokes: Sequence[Stroke]) -> list[co
 def _of_front(weight: Weight, outline: Outline, factor: complex, box: tuple[float, float, float]) -> list[Dimension]:
     """Return the dimensions of the front view: those of the shape, centre of mass and fillets."""
     left, bottom, top = box
-    shape, row = weight.body.shape, 0
+    shape = weight.body.shape
     dimensions: list[Dimension] = []
-    for one in (Along(shape.lever), *shape.dimensions):
-        if isinstance(one, Along):
-            base = complex(left - GAP - ROW * row, 0.0)
-            dimensions.append(Distance(0j, one.distance * factor, base, True))
-            row += 1
-        elif isinstance(one, Across):
+    for one in shape.dimensions:
+        if isinstance(one, Across):
             start, end = (complex(one.place, side * one.width) * factor for side in (-0.5, 0.5))
             height = top + GAP if start.imag >= 0.0 else bottom - GAP
             dimensions.append(Distance(start, end, complex(0.0, height), False))
@@ -160,8 +158,14 @@ def _of_front(weight: Weight, outline: Outline, factor: complex, box: tuple[floa
             radius, half = one.radius * abs(factor), 0.5 * one.angle
             first = -0.5 * math.pi - half
             dimensions.append(Angle(radius, first, one.angle, radius + GAP))
-        else:
-            dimensions.append(_radius(one, abs(factor)))
+        elif isinstance(one, Round):
+            dimensions.append(_radius(one, abs(factor), top))
+    lengths = sorted((shape.lever, *(one.distance for one in shape.dimensions if isinstance(one, Along))), key=abs)
+    arcs = [complex(one.line + ROW, 0.0) * cmath.exp(1j * one.first) for one in dimensions if isinstance(one, Angle)]
+    if any(end.imag > min(length * factor.imag for length in lengths) for end in arcs):
+        left = min(point.real for one in dimensions if isinstance(one, Angle) for point in one.reach)
+    for row, length in enumerate(lengths):
+        dimensions.append(Distance(0j, length * factor, complex(left - GAP - ROW * row, 0.0), True))
     fillets = [piece for piece in outline if isinstance(piece, Arc) and abs(piece.centre) > _SHARP
                and math.isclose(piece.radius, shape.fillet * abs(factor), rel_tol=1e-9)]  # fmt: skip
     if shape.fillet and fillets:
@@ -175,11 +179,11 @@ def _of_front(weight: Weight, outline: Outline, factor: complex, box: tuple[floa
     return dimensions
 
 
-def _radius(one: Round, factor: float) -> Radius:
+def _radius(one: Round, factor: float, top: float) -> Radius:
     angle, radius = one.angle - 0.5 * math.pi, one.radius * factor
-    # a hollow arc has its leader beyond the shaft
-    elbow = cmath.rect(-9.0 if one.is_hollow else radius + GAP + ROW, angle)
-    return Radius(0j, radius, angle, elbow)
+    # a hollow arc has its leader beyond the shaft, and above the body
+    length = -max(9.0, (top + 4.0) / math.cos(one.angle)) if one.is_hollow else radius + GAP + ROW
+    return Radius(0j, radius, angle, cmath.rect(length, angle))
 
 
 def _direction(engine: Engine, weight: Weight) -> tuple[complex, str]:
