@@ -1,4 +1,4 @@
-"""Counterweights and balancer weights as bodies: sizes that follow from unbalances, and clearances in the crankcase."""
+"""Counterweights and balancer weights as bodies: sizes, clearances in the crankcase, and drawings."""
 
 from laufruhe.extension import Extension
 
@@ -8,4 +8,6 @@ EXTENSION = Extension(
     keys=(f"{_HERE}.file:KEY",),
     weight_keys=(f"{_HERE}.file:KEY_OF_BODY",),
     sections=(f"{_HERE}.section:SECTION",),
+    pictures=(f"{_HERE}.section:PICTURE",),
+    commands=(f"{_HERE}.command:COMMAND",),
 )

@@ -17,12 +17,8 @@ from laufruhe.extensions.workshop.section import applies as applies
 from laufruhe.extensions.workshop.sheet import HEIGHT, WIDTH, Layer, Sheet, sheet_of
 from laufruhe.plots.style import finish_page, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL
-from laufruhe.present.pictures import ResultPicture
 from laufruhe.solvers.result import Result
 
-PICTURE = ResultPicture(
-    "bodies", "Drawings of the weights to scale: sizes, centre of mass and title block.", home=__name__
-)
 _INCH, _LETTERS, _FINE = 25.4, 10.0, 0.02
 _LOOKS = {
     Layer.OUTLINE: (INK, 1.4, "-"), Layer.HIDDEN: (INK, 0.8, (0, (4, 2))),

@@ -10,6 +10,7 @@ from laufruhe.extensions.workshop.crankcase import Clearance, is_checked
 from laufruhe.extensions.workshop.part import Weight, Workshop, clearances_of, weights_of
 from laufruhe.machine import Shaft
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
+from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
@@ -125,3 +126,7 @@ def _finite(value: float) -> float | None:
 
 
 SECTION = Section("workshop", applies, _tables, _record, ("bodies", "body-masses", "clearances", "shafts"))
+PICTURE = ResultPicture(
+    "bodies", "Drawings of the weights to scale: sizes, centre of mass and title block.",
+    home="laufruhe.extensions.workshop.picture",
+)  # fmt: skip
