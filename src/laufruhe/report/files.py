@@ -29,8 +29,8 @@ KINDS = ("png", "svg")
 TABLES = (
     "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings", "torque",
     "indicator", "uneven-firing", "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
-    "reach", "objectives-in-order", "equal-optima", "weights", "balance-factors", "crankshaft-torque", "gas-pressure",
-    "load-cases", "even-speeds",
+    "reach", "objectives-in-order", "equal-optima", "weights", "shafts", "balance-factors", "crankshaft-torque",
+    "gas-pressure", "load-cases", "even-speeds",
 )  # fmt: skip
 """Names of the tables of a result that are CSV files; extensions add theirs."""
 MADE = ".laufruhe.json"

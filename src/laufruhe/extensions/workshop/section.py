@@ -8,11 +8,11 @@ from typing import Any
 
 from laufruhe.extensions.workshop.crankcase import Clearance, is_checked
 from laufruhe.extensions.workshop.part import Weight, Workshop, clearances_of, weights_of
-from laufruhe.machine import Shaft
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
 from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
+from laufruhe.report.sections.weights import sense_of
 from laufruhe.solvers.result import Result
 
 _MM, _GRAMS, _GRAM_MM = 1e3, 1e3, 1e6
@@ -33,23 +33,7 @@ def applies(result: Result) -> bool:
 def _tables(result: Result) -> list[Table]:
     engine = result.final.engine
     weights = weights_of(engine)
-    shafts = dict.fromkeys(rotor.shaft for rotor in engine.rotors)
-    return [*_bodies(weights), _clearances(result), shaft_table(list(shafts))]
-
-
-def sense_of(shaft: Shaft) -> str:
-    """Return the sense of rotation of a shaft in words."""
-    return "with the crank" if shaft.ratio > 0.0 else "against the crank"
-
-
-def shaft_table(shafts: Sequence[Shaft]) -> Table:
-    """Return a table of the place, ratio and sense of shafts."""
-    rows = [
-        (shaft.name, trimmed(_MM * shaft.y), trimmed(_MM * shaft.z), f"{shaft.ratio:+g}", sense_of(shaft))
-        for shaft in shafts
-    ]
-    note = "y to the left, z up from the crank axis (C2); seen from the front the crank turns clockwise (C3)."
-    return Table(("shaft", "y [mm]", "z [mm]", "ratio", "turns"), rows, title="Shafts", note=note, file="shafts")
+    return [*_bodies(weights), _clearances(result)]
 
 
 def _bodies(weights: Sequence[Weight]) -> list[Table]:
@@ -125,7 +109,7 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-SECTION = Section("workshop", applies, _tables, _record, ("bodies", "body-masses", "clearances", "shafts"))
+SECTION = Section("workshop", applies, _tables, _record, ("bodies", "body-masses", "clearances"))
 PICTURE = ResultPicture(
     "bodies", "Drawings of the weights to scale: sizes, centre of mass and title block.",
     home="laufruhe.extensions.workshop.picture",

@@ -8,8 +8,9 @@ from laufruhe.report.sections import elastic, loads, stars, values, weights
 from laufruhe.solvers.result import Result
 
 SECTIONS = (
-    values.attainable, stars.crank_stars, values.objectives, values.decisions, weights.weights, weights.factors,
-    values.limits, loads.places, loads.gas, loads.torque, elastic.modes, elastic.load_cases, loads.orders,
+    values.attainable, stars.crank_stars, values.objectives, values.decisions, weights.weights, weights.shafts,
+    weights.factors, values.limits, loads.places, loads.gas, loads.torque, elastic.modes, elastic.load_cases,
+    loads.orders,
 )  # fmt: skip
 
 

@@ -1,11 +1,11 @@
-"""Tables of counterweights and balancer weights in g, g mm and degrees, and of balance factors."""
+"""Tables of counterweights and balancer weights in g, g mm and degrees, of their shafts, and of balance factors."""
 
 from __future__ import annotations
 
 import cmath
 import math
 
-from laufruhe.machine import Role, Rotor
+from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
@@ -15,6 +15,7 @@ from laufruhe.units import readable
 
 NEXT_TO_NOTHING = 1e-9
 _ANGLES = "Angles at a crank angle of 0, clockwise from the top, seen from the front (C4)."
+_SHAFTS = "y to the left, z up from the crank axis (C2). Seen from the front the crank turns clockwise (C3)."
 _FACTOR = (
     "Share of the reciprocating mass of a throw that its counterweights balance, beyond the rotating mass; "
     "a counterweight counts for the nearest throw."
@@ -54,6 +55,30 @@ def _size_and_angle(rotor: Rotor, scale: float, factor: float) -> tuple[str, str
         return "0", DASH
     angle = round(math.degrees(cmath.phase(rotor.unbalance)) % 360.0, 4) % 360.0
     return number(factor * size), trimmed(angle, 5)
+
+
+def sense_of(shaft: Shaft) -> str:
+    """Return the sense of rotation of a shaft in words."""
+    return "with the crank" if shaft.ratio > 0.0 else "against the crank"
+
+
+def shafts(result: Result) -> list[Table]:
+    """Return a table of the place, ratio and sense of the shafts of the final design, if there are several."""
+    (length, millimetres), engine = readable("m"), result.final.engine
+    found = dict.fromkeys([*(part.shaft for part in engine.slider_cranks), *(rotor.shaft for rotor in engine.rotors)])
+    rows = [
+        (
+            shaft.name,
+            trimmed(millimetres * shaft.y),
+            trimmed(millimetres * shaft.z),
+            f"{shaft.ratio:+g}",
+            sense_of(shaft),
+        )
+        for shaft in found
+    ]
+    head = ("shaft", f"y [{length}]", f"z [{length}]", "ratio", "turns")
+    is_shown = set(found) != {CRANKSHAFT}
+    return [Table(head, rows, title="Shafts", left=(0, 4), note=_SHAFTS, file="shafts")] if is_shown else []
 
 
 def factors(result: Result) -> list[Table]:
