@@ -85,6 +85,7 @@ lanes: $(STAMP)
 attack: export OMP_NUM_THREADS = 1
 
 attack: $(STAMP)
+	$(BIN)/python tests/attack/bodies.py
 	$(BIN)/python tests/attack/run_attack.py run all $(ATTACK)
 	$(BIN)/python tests/attack/run_attack.py page results/attack/*.jsonl
 

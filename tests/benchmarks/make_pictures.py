@@ -31,6 +31,7 @@ WANTED = {
     ("study", "tractor-study"): {name: f"tractor-study-{name}" for name in ("fig-10", "fig-22", "reciprocating-mass")},
     ("study", "torsion-pareto"): {"firing-order": "torsion-pareto"},
     ("study", "bearing-pareto"): {"mount-force": "bearing-pareto"},
+    ("solve", "single-crank-weight"): {"bodies": "single-crank-weight-bodies"},
     ("trade", "tractor-four-lanchester"): {"tractor-four-lanchester": "tractor-four-lanchester-trade"},
 }
 

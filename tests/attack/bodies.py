@@ -1,0 +1,155 @@
+"""Clearances and moments of random bodies against shapely and sums over points.
+
+python tests/attack/bodies.py --from 0 --number 200
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+from shapely import affinity
+from shapely.geometry import LineString, Point, Polygon
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from laufruhe.extensions.workshop.bodies import Body
+from laufruhe.extensions.workshop.crankcase import Crankcase, RodSize, Seat, clearances
+from laufruhe.extensions.workshop.outlines import corners_of
+from laufruhe.extensions.workshop.shapes import Cheek, Sector, Shape, Slab
+from laufruhe.machine import CRANKSHAFT, Shaft, SliderCrank
+from laufruhe.numerics.arrays import Array
+
+SIDE = 1000
+SAGGING = 1e-5
+"""Largest error of distances from polygons in place of arcs [m]."""
+COARSE = 2e-3
+"""Largest relative error of sums over points."""
+
+
+def polygon(shape: Shape) -> Polygon:
+    corners = corners_of(shape.outline, 1e-3)
+    return Polygon(np.column_stack([corners.real, corners.imag]))
+
+
+def within(shape: Shape, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return which points belong to a sharp shape, by its definition and not by its outline."""
+    r, turn = np.hypot(u, v), np.abs(np.arctan2(v, u))
+    inside = r <= shape.outer_radius
+    if isinstance(shape, Sector):
+        return inside & (r >= shape.inner_radius) & (turn <= 0.5 * shape.angle)
+    if isinstance(shape, Slab):
+        return inside & (u >= shape.inner_radius) & (np.abs(v) <= 0.5 * (shape.width or math.inf))
+    assert isinstance(shape, Cheek)
+    half = 0.5 * shape.width
+    plate = (np.abs(v) <= half) & (u >= half - shape.tail) & ((u < 0.0) | inside)
+    end = np.hypot(u - half + shape.tail, v) <= half
+    return plate | end | (inside & (turn <= 0.5 * (shape.angle or 0.0)))
+
+
+def worst_of_points(shape: Shape) -> float:
+    """Return the largest error of area, first and polar moment against a million points.
+
+    It is relative to the area times a power of the outer radius.
+    """
+    reach = 1.01 * max(shape.outer_radius, getattr(shape, "tail", 0.0))
+    places = reach * ((np.arange(SIDE) + 0.5) / SIDE * 2.0 - 1.0)
+    u, v = np.meshgrid(places, places)
+    cell, inside = (2.0 * reach / SIDE) ** 2, within(shape, u, v)
+    area, far = cell * inside.sum(), shape.outer_radius
+    first, polar = cell * (u + 1j * v)[inside].sum(), cell * (u**2 + v**2)[inside].sum()
+    ours = shape.moments
+    return float(max(abs(ours.area - area) / area, abs(ours.first - first) / (area * far),
+                     abs(ours.polar - polar) / (area * far**2)))  # fmt: skip
+
+
+def part_of(rng: np.random.Generator) -> SliderCrank:
+    r = rng.uniform(0.03, 0.07)
+    length, bore = r / rng.uniform(0.22, 0.34), r * rng.uniform(1.4, 2.2)
+    return SliderCrank(
+        "cylinder 1", 0.0, r, length, 1.0, throw=rng.uniform(0.0, 6.0), bank=rng.uniform(-1.0, 1.0),
+        offset=rng.uniform(-0.1, 0.1) * r, bore=bore,
+    )  # fmt: skip
+
+
+def by_shapely(part: SliderCrank, case: Crankcase, body: Body, seat: Seat, angles: Array) -> dict[str, float]:
+    """Return the least distances at some crank angles, with the slider-crank written out anew."""
+    least = {"piston of cylinder 1": math.inf, "rod of cylinder 1": math.inf}
+    shape, rod = polygon(body.shape), case.rod
+    assert rod is not None
+    assert case.skirt is not None
+    for phi in angles:
+        turn = part.throw + phi - part.bank
+        pin = (part.crank_radius * math.cos(turn), part.crank_radius * math.sin(turn))
+        up = pin[0] + math.sqrt(part.rod_length**2 - (pin[1] - part.offset) ** 2)
+        half, lower = 0.5 * (part.bore or 0.0), up - case.skirt
+        piston = Polygon([(lower, part.offset - half), (lower, part.offset + half), (up + half, part.offset + half),
+                          (up + half, part.offset - half)])  # fmt: skip
+        line = LineString([pin, (up, part.offset)]).buffer(0.5 * rod.width, quad_segs=64)
+        ends = (
+            Point(pin).buffer(0.5 * rod.big_end, quad_segs=64),
+            Point(up, part.offset).buffer(0.5 * rod.small_end, quad_segs=64),
+        )
+        assert seat.angle is not None
+        turned = affinity.rotate(shape, seat.angle + seat.shaft.ratio * phi - part.bank, (0, 0), use_radians=True)
+        axis = complex(seat.shaft.z, seat.shaft.y) * np.exp(-1j * part.bank)
+        turned = affinity.translate(turned, axis.real, axis.imag)
+        least["piston of cylinder 1"] = min(least["piston of cylinder 1"], turned.distance(piston))
+        least["rod of cylinder 1"] = min(least["rod of cylinder 1"], *(turned.distance(one) for one in (line, *ends)))
+    return least
+
+
+def compare_with_shapely(seed: int, steps: int = 720) -> tuple[Shape, list[str]]:
+    """Compare the clearances of one random engine; return its shape, and a line for each difference."""
+    rng = np.random.default_rng(seed)
+    part = part_of(rng)
+    rod = RodSize(0.3 * part.crank_radius, 0.03, 1.1 * part.crank_radius, 0.6 * part.crank_radius)
+    room = part.rod_length - part.crank_radius
+    case = Crankcase(0.0, 0.35 * room, rod)
+    outer = rng.uniform(0.4, 0.75) * room
+    shape = [
+        Sector(outer, 0.002, 0.3 * outer, rng.uniform(0.5, 3.0)),
+        Slab(outer, 0.002, 0.4 * outer, rng.uniform(0.5, 1.2) * outer),
+        Cheek(outer, 0.0, 0.8 * outer, 0.6 * outer, rng.uniform(1.0, 3.0)),
+    ][seed % 3]
+    is_crank = bool(rng.integers(2))
+    far = part.crank_radius + rng.uniform(0.8, 1.8) * room
+    aside = far * np.exp(1j * rng.uniform(0.0, math.tau))
+    shaft = CRANKSHAFT if is_crank else Shaft("s", float(rng.choice([-1.0, 2.0, -2.0])), aside.imag, aside.real)
+    seat = Seat(0.0, shaft, rng.uniform(0.0, 6.0))
+    body = Body(shape, 0.02, 7850.0)
+    theirs = by_shapely(part, case, body, seat, np.linspace(0.0, 4.0 * math.pi, steps, endpoint=False))
+    wrong = []
+    for clearance in clearances(case, [part], 4.0 * math.pi, body, seat):
+        least, sampled = clearance.minimum, theirs[clearance.part]
+        # no sampled angle is below the bound, and the angle of the least distance has this distance
+        there = by_shapely(part, case, body, seat, np.array([least.angle]))[clearance.part]
+        if least.bound > max(sampled, 0.0) + SAGGING or abs(there - max(least.distance, 0.0)) > SAGGING:
+            wrong.append(f"{seed} {clearance.part}: {least}, sampled {sampled:g} m, there {there:g} m")
+    return shape, wrong
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--from", dest="first", type=int, default=0)
+    parser.add_argument("--number", type=int, default=200, help="of engines")
+    parser.add_argument("--steps", type=int, default=720, help="crank angles of a cycle that shapely samples")
+    told = parser.parse_args()
+    faults, worst = [], 0.0
+    for seed in range(told.first, told.first + told.number):
+        shape, wrong = compare_with_shapely(seed, told.steps)
+        error = worst_of_points(shape.sized(fillet=0.0))
+        worst = max(worst, error)
+        faults += [*wrong, *([f"{seed} {shape}: moments differ by {error:.2g}"] if error > COARSE else [])]
+    print(*faults, sep="\n", end="\n" if faults else "")
+    print(
+        f"{told.number} engines, {len(faults)} differences; moments differ from sums over points by {worst:.1e} at most"
+    )
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()
