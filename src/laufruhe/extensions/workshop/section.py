@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from laufruhe.extensions.workshop.crankcase import Clearance, is_checked
+from laufruhe.extensions.workshop.crankcase import is_checked
 from laufruhe.extensions.workshop.part import Weight, Workshop, clearances_of, weights_of
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
 from laufruhe.present.pictures import ResultPicture
@@ -14,8 +14,8 @@ from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.report.sections.weights import sense_of
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable
 
-_MM, _GRAMS, _GRAM_MM = 1e3, 1e3, 1e6
 _SIZES = ("inner_radius", "outer_radius", "angle", "width", "tail", "fillet")
 _SIZE_NOTE = "Open sizes are those of the least mass with this unbalance."
 _MASS_NOTE = "Mass, unbalance and inertia are those of all bodies of a weight; the inertia is about its shaft."
@@ -37,20 +37,24 @@ def _tables(result: Result) -> list[Table]:
 
 
 def _bodies(weights: Sequence[Weight]) -> list[Table]:
+    (length, millimetres), (mass, grams), (unbalance, factor) = (
+        readable("m"), readable("kg", "g"), readable("kg m", "g mm")
+    )  # fmt: skip
     keys = [key for key in _SIZES if any(weight.body.shape.sizes.get(key) for weight in weights)]
     sizes, masses = list[Sequence[str]](), list[Sequence[str]]()
     for weight in weights:
         body, name = weight.body, weight.rotor.name
         of_shape = [_size_text(body.shape.sizes.get(key), key in body.shape.angles) for key in keys]
         count = "2" if body.spacing else "1"
-        sizes.append((name, body.shape.name, count, *of_shape, trimmed(_MM * body.thickness)))
+        sizes.append((name, body.shape.name, count, *of_shape, trimmed(millimetres * body.thickness)))
         masses.append(
-            (name, number(_GRAMS * body.mass), number(_GRAM_MM * body.unbalance), trimmed(_MM * body.shape.lever),
+            (name, number(grams * body.mass), number(factor * body.unbalance), trimmed(millimetres * body.shape.lever),
              number(1e6 * body.inertia), weight.fault or DASH)
         )  # fmt: skip
-    units = [f"{key.replace('_', ' ')} [{'deg' if key == 'angle' else 'mm'}]" for key in keys]
-    head = ("weight", "kind", "bodies", *units, "thickness [mm]")
-    of_masses = ("weight", "mass [g]", "unbalance [g mm]", "centre of mass at [mm]", "inertia [kg mm^2]", "remark")
+    units = [f"{key.replace('_', ' ')} [{'deg' if key == 'angle' else length}]" for key in keys]
+    head = ("weight", "kind", "bodies", *units, f"thickness [{length}]")
+    of_masses = ("weight", f"mass [{mass}]", f"unbalance [{unbalance}]", f"centre of mass at [{length}]",
+                 "inertia [kg mm^2]", "remark")  # fmt: skip
     return [
         Table(head, sizes, title="Bodies of the weights", left=2, note=_SIZE_NOTE, file="bodies"),
         Table(of_masses, masses, title="Masses of the bodies", left=(0, 5), note=_MASS_NOTE, file="body-masses"),
@@ -60,28 +64,25 @@ def _bodies(weights: Sequence[Weight]) -> list[Table]:
 def _size_text(size: float | None, is_angle: bool) -> str:
     if not size:
         return DASH
-    return trimmed(math.degrees(size) if is_angle else _MM * size)
-
-
-def clearance_text(clearance: Clearance) -> str:
-    """Return a clearance in millimetres, or that the parts collide."""
-    distance = clearance.minimum.distance
-    return "collides" if distance < 0.0 else fixed(_MM * distance, 2)
+    return trimmed(math.degrees(size) if is_angle else readable("m")[1] * size)
 
 
 def _clearances(result: Result) -> Table:
     engine = result.final.engine
     workshop, rows = engine.extra(Workshop), []
+    length, millimetres = readable("m")
     wanted = workshop.crankcase.clearance if workshop else 0.0
     for weight, distances in clearances_of(engine, weights_of(engine)):
         for clearance in distances:
             angle = clearance.minimum.angle
             at = "all" if math.isnan(angle) else fixed(math.degrees(angle), 1)
-            rows.append((weight.rotor.name, clearance.part, clearance_text(clearance), at))
+            distance = clearance.minimum.distance
+            size = "collides" if distance < 0.0 else number(millimetres * distance)
+            rows.append((weight.rotor.name, clearance.part, size, at))
     omitted = [part.name for part in engine.slider_cranks if not is_checked(part)]
     more = f" Not checked, because they are no plain slider-cranks: {', '.join(omitted)}." if omitted else ""
-    note = f"{_CLEARANCE_NOTE} The file demands {trimmed(_MM * wanted)} mm.{more}"
-    head = ("weight", "part", "clearance [mm]", "at crank angle [deg]")
+    note = f"{_CLEARANCE_NOTE} The file demands {trimmed(millimetres * wanted)} {length}.{more}"
+    head = ("weight", "part", f"clearance [{length}]", "at crank angle [deg]")
     return Table(head, rows, title="Clearances of the bodies", left=2, note=note, file="clearances")
 
 
