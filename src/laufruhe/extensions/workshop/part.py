@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -97,8 +96,3 @@ def clearances_of(engine: Engine, weights: Sequence[Weight]) -> Iterator[tuple[W
         ]
         distances = clearances(crankcase, engine.slider_cranks, engine.cycle.angle, weight.body, weight.seat, others)
         yield weight, sorted(distances, key=lambda clearance: clearance.minimum.distance)
-
-
-def smallest_clearance(distances: Sequence[Clearance]) -> float:
-    """Return the least of some clearances [m]; infinite without any."""
-    return min((clearance.minimum.distance for clearance in distances), default=math.inf)
