@@ -44,7 +44,7 @@ class Arrowhead:
 
 @dataclass(frozen=True)
 class Marks:
-    """What is drawn of a dimension."""
+    """Lines, arrowheads and text of a dimension."""
 
     pieces: tuple[Piece, ...]
     arrowheads: tuple[Arrowhead, ...]
@@ -61,7 +61,7 @@ class Distance:
     is_upright: bool
 
     def marks(self, scale: float) -> Marks:
-        """Return what is drawn; the text states the distance over the scale."""
+        """Return lines, arrowheads and text; the text states the distance over the scale."""
         along = 1j if self.is_upright else 1.0 + 0j
         pieces: list[Piece] = []
         feet = []
@@ -105,7 +105,7 @@ class Radius:
     count: int = 1
 
     def marks(self, scale: float) -> Marks:
-        """Return what is drawn; the text states the radius over the scale."""
+        """Return lines, arrowheads and text; the text states the radius over the scale."""
         tip, end = self.centre + cmath.rect(self.radius, self.angle), self.elbow + LANDING
         text = f"R{size_text(self.radius / scale)}"
         words = Words(self.elbow + complex(0.5 * LANDING, 0.9 * LETTER),
@@ -128,7 +128,7 @@ class Angle:
     line: float
 
     def marks(self, _: float) -> Marks:
-        """Return what is drawn."""
+        """Return lines, arrowheads and text."""
         arc = Arc(0j, self.line, self.first, self.turn)
         sides = [Line(cmath.rect(self.radius + _OFF, angle), cmath.rect(self.line + _BEYOND, angle))
                  for angle in (self.first, self.first + self.turn)]  # fmt: skip

@@ -22,11 +22,11 @@ def distance_to_polygon(outline: Outline, corners: ComplexArray) -> Array:
     `corners` has shape (k, n): one corner is a point, two are the ends of a line (H6).
     """
     starts, ends = (corners, np.roll(corners, -1, axis=0)) if len(corners) > 2 else (corners[:1], corners[-1:])
-    own = np.array([piece.start for piece in outline])
+    vertices = np.array([piece.start for piece in outline])
     lines = np.array([(piece.start, piece.end) for piece in outline if isinstance(piece, Line)])
     arcs = [piece for piece in outline if isinstance(piece, Arc)]
     # pieces, sides and polygons are the axes
-    distances = [_to_line(own[:, None, None], starts, ends)]
+    distances = [_to_line(vertices[:, None, None], starts, ends)]
     if len(lines):
         a, b = lines.T[:, :, None, None]
         crosses = (_side(a, b, starts) * _side(a, b, ends) < 0.0) & (
@@ -36,12 +36,12 @@ def distance_to_polygon(outline: Outline, corners: ComplexArray) -> Array:
     if arcs:
         distances += _to_arcs(arcs, corners, starts, ends)
     nearest = np.min([part.min(axis=(0, 1)) for part in distances], axis=0)
-    is_inside = _is_within(own[:, None], corners[0])
+    is_inside = _is_within(vertices[:, None], corners[0])
     for arc in arcs:
         # the outline is its chords, and a segment beyond or within the chord of every arc
         is_inside ^= _is_in_segment(arc, corners[0])
     if len(corners) > 2:
-        is_inside |= _is_within(corners, np.full(corners.shape[1], own[0]))
+        is_inside |= _is_within(corners, np.full(corners.shape[1], vertices[0]))
     return np.where(is_inside | (nearest == 0.0), -np.inf, nearest)
 
 

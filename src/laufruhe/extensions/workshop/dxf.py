@@ -68,13 +68,13 @@ def write_dxf(sheet: Sheet, path: Path) -> None:
 def _set_dimensions(document: Any, full: float) -> None:
     document.styles.add(_STYLE, font="DejaVuSans.ttf")
     style = document.dimstyles.duplicate_entry("EZDXF", _STYLE)
-    looks = {
+    settings = {
         "dimscale": full, "dimtxt": LETTER, "dimtxsty": _STYLE, "dimasz": ARROW, "dimtsz": 0.0,
         "dimexo": 1.0, "dimexe": 1.5, "dimgap": 0.6, "dimtad": 1, "dimdec": DECIMALS, "dimzin": 8, "dimlfac": 1.0,
         "dimadec": DECIMALS, "dimazin": 2, "dimaunit": 0, "dimrnd": 0.0, "dimtih": 0, "dimtoh": 0, "dimdsep": ord("."),
         "dimfxlon": 0,
     }  # fmt: skip
-    for name, value in looks.items():
+    for name, value in settings.items():
         style.dxf.set(name, value)
 
 
@@ -92,14 +92,14 @@ def _closed(space: Any, outline: Outline, full: float) -> None:
 
 
 def _stroke(space: Any, piece: Piece, full: float, layer: Layer) -> None:
-    look = {"layer": layer.value}
+    attributes = {"layer": layer.value}
     if isinstance(piece, Line):
-        space.add_line(_point(piece.start, full), _point(piece.end, full), dxfattribs=look)
+        space.add_line(_point(piece.start, full), _point(piece.end, full), dxfattribs=attributes)
     elif piece.turn >= math.tau:
-        space.add_circle(_point(piece.centre, full), piece.radius * full, dxfattribs=look)
+        space.add_circle(_point(piece.centre, full), piece.radius * full, dxfattribs=attributes)
     else:
         first, last = (math.degrees(angle) for angle in (piece.first_angle, piece.first_angle + piece.turn))
-        space.add_arc(_point(piece.centre, full), piece.radius * full, first, last, dxfattribs=look)
+        space.add_arc(_point(piece.centre, full), piece.radius * full, first, last, dxfattribs=attributes)
 
 
 def _arrowhead(space: Any, head: Arrowhead, full: float) -> None:
@@ -110,29 +110,29 @@ def _words(space: Any, words: Words, full: float) -> None:
     from ezdxf.enums import TextEntityAlignment
 
     height = (_SMALL if words.is_small else 1.0) * LETTER * full
-    look = {"layer": Layer.FRAME.value, "height": height, "style": _STYLE, "rotation": math.degrees(words.angle)}
+    attributes = {"layer": Layer.FRAME.value, "height": height, "style": _STYLE, "rotation": math.degrees(words.angle)}
     align = TextEntityAlignment.MIDDLE_CENTER if words.is_centred else TextEntityAlignment.LEFT
-    space.add_text(words.text, dxfattribs=look).set_placement(_point(words.place, full), align=align)
+    space.add_text(words.text, dxfattribs=attributes).set_placement(_point(words.place, full), align=align)
 
 
 def _dimension(document: Any, one: Dimension, marks: Marks, full: float) -> None:
     """Add a dimension that other programs can change, drawn as in the picture until they do."""
-    space, look = document.modelspace(), {"dimstyle": _STYLE, "dxfattribs": {"layer": Layer.MARK.value}}
+    space, attributes = document.modelspace(), {"dimstyle": _STYLE, "dxfattribs": {"layer": Layer.MARK.value}}
     if isinstance(one, Distance):
         added = space.add_linear_dim(
             base=_point(one.base, full), p1=_point(one.start, full), p2=_point(one.end, full),
-            angle=90.0 if one.is_upright else 0.0, **look,
+            angle=90.0 if one.is_upright else 0.0, **attributes,
         )  # fmt: skip
     elif isinstance(one, Angle):
         last = one.first + one.turn
         added = space.add_angular_dim_cra(
             (0.0, 0.0), one.radius * full, math.degrees(one.first), math.degrees(last),
-            (one.line - one.radius) * full, **look,
+            (one.line - one.radius) * full, **attributes,
         )  # fmt: skip
     else:
         text = "<>" if one.count == 1 else f"{one.count}x <>"
         added = space.add_radius_dim(
-            _point(one.centre, full), radius=one.radius * full, angle=math.degrees(one.angle), text=text, **look
+            _point(one.centre, full), radius=one.radius * full, angle=math.degrees(one.angle), text=text, **attributes
         )
     entity, block = added.dimension, document.blocks.new_anonymous_block(type_char="D")
     entity.dxf.geometry, entity.dxf.text_midpoint = block.name, _point(marks.words.place, full)

@@ -20,7 +20,7 @@ from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.solvers.result import Result
 
 _INCH, _LETTERS, _FINE = 25.4, 10.0, 0.02
-_LOOKS = {
+_STYLES = {
     Layer.OUTLINE: (INK, 1.4, "-"), Layer.HIDDEN: (INK, 0.8, (0, (4, 2))),
     Layer.CENTRE: (FAINT, 0.6, (0, (12, 3, 2, 3))), Layer.MARK: (INK, 0.7, "-"), Layer.FRAME: (INK, 0.8, "-"),
 }  # fmt: skip
@@ -65,7 +65,7 @@ def _points(piece: Piece) -> list[complex]:
 
 
 def _line(axes: Axes, points: Sequence[complex], layer: Layer) -> None:
-    colour, width, dash = _LOOKS[layer]
+    colour, width, dash = _STYLES[layer]
     x, y = np.real(points), np.imag(points)
     axes.plot(x, y, color=colour, linewidth=width, linestyle=dash, solid_joinstyle="miter", clip_on=False)
 

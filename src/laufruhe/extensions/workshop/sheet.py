@@ -76,7 +76,7 @@ class Sheet:
 
     @property
     def marks(self) -> list[Marks]:
-        """What is drawn of the dimensions."""
+        """Lines, arrowheads and texts of the dimensions."""
         return [dimension.marks(self.scale) for dimension in self.dimensions]
 
 
@@ -106,7 +106,7 @@ def _laid_out(engine: Engine, weight: Weight, title: str, scale: float) -> tuple
     bottom, top = float(points.imag.min()), max(float(points.imag.max()), 0.0)
     dimensions = _of_front(weight, outline, factor, (left, bottom, top))
     above = sum(isinstance(one, Distance) and one.base.imag > top for one in dimensions)
-    along, said = _direction(engine, weight)
+    along, label = _direction(engine, weight)
     leaders = (one.elbow for one in dimensions if isinstance(one, Radius) and 0.0 <= one.elbow.real < ROW)
     reach = max(float((points * along.conjugate()).real.max()) + 3.0 + (GAP + 5.0) * above, 6.0,
                 *(elbow.imag + 2.0 * LETTER for elbow in leaders))  # fmt: skip
@@ -117,17 +117,17 @@ def _laid_out(engine: Engine, weight: Weight, title: str, scale: float) -> tuple
         Stroke(Line(complex(0.0, top + _EDGE), complex(0.0, bottom - _EDGE)), Layer.CENTRE),
         *(Stroke(piece, Layer.MARK) for piece in _mark(centre)),
     ]
-    text_width = len(said) * 0.8 * LETTER
-    said_at = arrow.tip + complex(2.0 if arrow.tip.real >= -1.0 else -2.0 - text_width, -0.5 * LETTER)
-    words = [Words(said_at, said), Words(centre + complex(2.0, -LETTER - 1.0), "S")]
-    side = max(right, said_at.real + text_width, *(point.real for point in _ends(dimensions, ()))) + _SIDE_GAP
+    text_width = len(label) * 0.8 * LETTER
+    label_place = arrow.tip + complex(2.0 if arrow.tip.real >= -1.0 else -2.0 - text_width, -0.5 * LETTER)
+    words = [Words(label_place, label), Words(centre + complex(2.0, -LETTER - 1.0), "S")]
+    side = max(right, label_place.real + text_width, *(point.real for point in _ends(dimensions, ()))) + _SIDE_GAP
     view, of_side = _side_view(weight, points, side, scale)
     strokes += view
     dimensions += of_side
     far = max(_ends(dimensions, view), key=lambda point: point.real).real + 10.0
-    lows = [point.imag for point in (*_ends(dimensions, view), complex(0.0, bottom), arrow.tip, said_at)]
+    lows = [point.imag for point in (*_ends(dimensions, view), complex(0.0, bottom), arrow.tip, label_place)]
     highs = [point.imag for point in (*_ends(dimensions, view), complex(0.0, top + _EDGE), arrow.tip)]
-    near = min(*(point.real for point in _ends(dimensions, view)), left, said_at.real) - 8.0
+    near = min(*(point.real for point in _ends(dimensions, view)), left, label_place.real) - 8.0
     low, high = min(lows) - 8.0, max(highs) + 8.0
     strokes.append(Stroke(Line(complex(left - _EDGE, 0.0), complex(far - 2.0, 0.0)), Layer.CENTRE))
     room = complex(WIDTH, HEIGHT - BLOCK_HEIGHT)
@@ -187,15 +187,15 @@ def _radius(one: Round, factor: float, top: float) -> Radius:
 
 
 def _direction(engine: Engine, weight: Weight) -> tuple[complex, str]:
-    """Return the direction to the crank pin, or upwards for a shaft without cranks, and its text."""
+    # return the direction to the crank pin, or upwards for a shaft without cranks, and its text
     rotor = weight.rotor
     parts = [part for part in engine.slider_cranks if part.shaft.name == rotor.shaft.name]
-    to, said = 0.0, "up at crank angle 0"
+    to, label = 0.0, "up at crank angle 0"
     if parts:
         part = min(parts, key=lambda part: abs(part.x - rotor.x))
-        to, said = part.throw, f"crank pin of {part.name}"
+        to, label = part.throw, f"crank pin of {part.name}"
     # seen from the front, angles grow clockwise
-    return _DOWN * cmath.rect(1.0, (weight.seat.angle or 0.0) - to), said
+    return _DOWN * cmath.rect(1.0, (weight.seat.angle or 0.0) - to), label
 
 
 def _mark(centre: complex) -> list[Piece]:
@@ -229,7 +229,7 @@ def _side_view(weight: Weight, points: np.ndarray, left: float, scale: float) ->
 
 
 def _edges(weight: Weight, points: np.ndarray, scale: float) -> list[tuple[float, bool]]:
-    """Return heights of the edges of the side view between its ends, each with True if it is seen."""
+    """Return heights of the edges of the side view between its ends, single with True if it is seen."""
     outline = weight.body.shape.outline
     edges: dict[float, bool] = {}
     for before, after in zip((outline[-1], *outline[:-1]), outline, strict=True):
@@ -250,8 +250,8 @@ def _block(weight: Weight, title: str, scale: float, corner: complex) -> tuple[l
     """Return lines and texts of the frame and the title block."""
     body = weight.body
     count = 2 if body.spacing else 1
-    each = f"{number(_MM * body.mass / count)} g"
-    mass = f"2 × {each} = {number(_MM * body.mass)} g" if count > 1 else each
+    single = f"{number(_MM * body.mass / count)} g"
+    mass = f"2 × {single} = {number(_MM * body.mass)} g" if count > 1 else single
     rows = (
         ((0.0, "part", weight.rotor.name), (70.0, "engine", title)),
         ((0.0, "body", f"{body.shape.name}, {count} off"), (70.0, "mass", mass),

@@ -65,7 +65,9 @@ def sense_of(shaft: Shaft) -> str:
 def shafts(result: Result) -> list[Table]:
     """Return a table of the place, ratio and sense of the shafts of the final design, if there are several."""
     (length, millimetres), engine = readable("m"), result.final.engine
-    found = dict.fromkeys([*(part.shaft for part in engine.slider_cranks), *(rotor.shaft for rotor in engine.rotors)])
+    all_shafts = dict.fromkeys(
+        [*(part.shaft for part in engine.slider_cranks), *(rotor.shaft for rotor in engine.rotors)]
+    )
     rows = [
         (
             shaft.name,
@@ -74,10 +76,10 @@ def shafts(result: Result) -> list[Table]:
             f"{shaft.ratio:+g}",
             sense_of(shaft),
         )
-        for shaft in found
+        for shaft in all_shafts
     ]
     head = ("shaft", f"y [{length}]", f"z [{length}]", "ratio", "turns")
-    is_shown = set(found) != {CRANKSHAFT}
+    is_shown = set(all_shafts) != {CRANKSHAFT}
     return [Table(head, rows, title="Shafts", left=(0, 4), note=_SHAFTS, file="shafts")] if is_shown else []
 
 
