@@ -129,7 +129,7 @@ docs: $(STAMP)
 lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict src
+	$(BIN)/mypy --strict src docs/examples
 	$(BIN)/lint-imports
 
 format: $(STAMP)

@@ -62,6 +62,8 @@ html_theme = "furo"
 html_show_copyright = False
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+# a guide for programs that write problem files
+html_extra_path = ["llms.txt"]
 html_title = "Laufruhe"
 html_theme_options = {"navigation_with_keys": True}
 

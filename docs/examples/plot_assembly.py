@@ -9,5 +9,5 @@ ones.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/selective-assembly.toml")
+result = laufruhe.solve("selective-assembly")
 assembly = figure(result, "assembly")

@@ -9,5 +9,5 @@ block and journals wear.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/tractor-three-bearings.toml")
+result = laufruhe.solve("tractor-three-bearings")
 bearings = figure(result, "bearings")

@@ -9,7 +9,7 @@ show the path of the force on each mount, and loads over the crank angle, before
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/tractor-single.toml")
+result = laufruhe.solve("tractor-single")
 polar = figure(result, "polar")
 
 # %%

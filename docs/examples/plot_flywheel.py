@@ -8,5 +8,5 @@ Torque over the cycle, work that the flywheel stores, and crank speed.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/diesel-70-hp-flywheel.toml")
+result = laufruhe.solve("diesel-70-hp-flywheel")
 torque = figure(result, "torque")

@@ -8,5 +8,5 @@ The smallest sag that keeps the bounce mode below a given frequency, and the for
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/study-soft-mounts.toml")
+result = laufruhe.solve("study-soft-mounts")
 transmissibility = figure(result, "transmissibility")

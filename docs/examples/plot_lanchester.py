@@ -9,7 +9,7 @@ force on each mount. Spectrum: amplitude of the loads by order of crank speed.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/tractor-four-lanchester.toml")
+result = laufruhe.solve("tractor-four-lanchester")
 bars = figure(result, "bars")
 
 # %%

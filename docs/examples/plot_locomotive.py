@@ -9,5 +9,5 @@ surging and swaying.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/locomotive-two-cylinder.toml")
+result = laufruhe.solve("locomotive-two-cylinder")
 bearings = figure(result, "bearings")

@@ -9,7 +9,7 @@ remains that no single counterweight balances.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/radial-seven.toml")
+result = laufruhe.solve("radial-seven")
 engine = figure(result, "engine")
 
 # %%

@@ -8,7 +8,7 @@ Two rotors on eccentrics. The lightest end weights that leave no force and no co
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/rotary-two.toml")
+result = laufruhe.solve("rotary-two")
 engine = figure(result, "engine")
 
 # %%

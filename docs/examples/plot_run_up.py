@@ -8,5 +8,5 @@ A start takes the engine through the resonances of its soft mounts. There it mov
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/soft-mounts-run-up.toml")
+result = laufruhe.solve("soft-mounts-run-up")
 run_up = figure(result, "run_up")

@@ -8,5 +8,5 @@ Sizes, places and heights of two shafts are decided together. The drawing is to 
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/tractor-four-shaft-heights.toml")
+result = laufruhe.solve("tractor-four-shaft-heights")
 engine = figure(result, "engine")

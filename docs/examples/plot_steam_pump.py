@@ -8,7 +8,7 @@ Steam piston and pumps on one rod. Indicator diagrams of the chambers, and the s
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/waterworks-steam-pump.toml")
+result = laufruhe.solve("waterworks-steam-pump")
 indicator = figure(result, "indicator")
 
 # %%

@@ -9,5 +9,5 @@ kinetic energy of each natural mode.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/powertrain-torque-roll.toml")
+result = laufruhe.solve("powertrain-torque-roll")
 modes = figure(result, "modes")

@@ -9,7 +9,7 @@ modes of the crankshaft and the torque over crank speed.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/inline-five-damper.toml")
+result = laufruhe.solve("inline-five-damper")
 twist_modes = figure(result, "twist_modes")
 
 # %%

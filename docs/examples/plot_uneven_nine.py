@@ -8,5 +8,5 @@ If firing intervals may differ by a few degrees, throws of a nine-cylinder exist
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/inline-nine-uneven.toml")
+result = laufruhe.solve("inline-nine-uneven")
 trade = figure(result, "trade")

@@ -9,7 +9,7 @@ counterweights.
 import laufruhe
 from laufruhe.plots import figure
 
-result = laufruhe.solve("../../problems/vee-eight-open.toml")
+result = laufruhe.solve("vee-eight-open")
 star = figure(result, "star")
 
 # %%

@@ -157,7 +157,11 @@ def load(source: Source) -> Problem:
         With one line for everything wrong: file, key, value, rule, remedy.
     """
     from laufruhe.files.reader import load as read
+    from laufruhe.python.draft import EngineDraft
 
+    if isinstance(source, EngineDraft):
+        remedy = 'give its problem, such as engine.problem("2500 rpm", minimise="mean mount force")'
+        raise wrong_call("problem", source, "is an engine without operating points", remedy)
     return read(source)
 
 

@@ -29,6 +29,9 @@ CALLS: dict[str, Call] = {
     "line 1, column 8: is no TOML": lambda p, r: laufruhe.load("title =\n"),
     "problem = '': is empty; give a path": lambda p, r: laufruhe.load(""),
     "study: makes this a study file": lambda p, r: laufruhe.solve(STUDY),
+    "is an engine without operating points; give its problem": lambda p, r: laufruhe.evaluate(
+        laufruhe.engine("bmw-b48")
+    ),
     "study: is missing": lambda p, r: laufruhe.study(FOUR),
     "none.toml: file: does not exist": lambda p, r: laufruhe.study(Path("none.toml")),
     "jobs = 0: must be a whole number, 1 or more": lambda p, r: laufruhe.study(STUDY, jobs=0),

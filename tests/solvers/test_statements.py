@@ -363,3 +363,26 @@ def test_numbers_without_affine_loads_are_refused_by_name() -> None:
     for state in (problem.affine, problem.to_cvxpy, problem.objective_function):
         with pytest.raises(ModelError, match=r"no affine function of engine.rod_ratio; fix it"):
             state()
+
+
+@pytest.mark.slow
+def test_limits_are_constraints_of_scipy() -> None:
+    """SLSQP keeps the limit of mass, and its design is proven optimal; gradients are differences."""
+    problem = laufruhe.load("tractor-four-lanchester")
+    problem = problem.fix("front web.mass").fix("rear web.mass").limit("balancer mass", max=0.8, name="light")
+    function = problem.objective_function()
+    constraints = function.constraints
+    assert len(constraints) == len(problem.limits) == 2
+    x = np.linspace(0.004, 0.007, len(function.names))
+    for one in constraints:
+        steps = 1e-7 * np.eye(len(x))
+        slope = [(one["fun"](x + step) - one["fun"](x - step)) / 2e-7 for step in steps]
+        assert one["jac"](x) == pytest.approx(np.array(slope), rel=1e-5, abs=1e-6)
+    end = minimize(
+        function, x, jac=True, bounds=function.bounds, constraints=constraints, method="SLSQP", options={"ftol": 1e-12}
+    )
+    best = laufruhe.solve(problem)
+    assert end.fun == pytest.approx(best["mean mount force"], rel=1e-5)
+    assert best["light"] == pytest.approx(0.8, rel=1e-6)
+    assert min(one["fun"](end.x) for one in constraints) > -1e-8
+    assert len(repr(function)) < 200

@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from laufruhe import units
+from laufruhe.errors import refused
 from laufruhe.extension import HOMES, extensions, missing_extension
 from laufruhe.machine.crank_names import CRANKS
 from laufruhe.problem.decision import Decision, Drive
@@ -366,6 +367,21 @@ class Table(BaseModel):
             resolved = handler.resolve_ref_schema(reference)
             resolved |= without_open(resolved)
         return reference
+
+
+FORMAT = 1
+"""Newest format of problem files, study files and result.json."""
+
+
+FormatNumber = Annotated[int, Field(ge=1)]
+
+
+def check_format(record: Mapping[str, Any], source: object) -> None:
+    """Refuse a file of a newer format before anything else is read; raise `InputError`."""
+    number = record.get("format", FORMAT)
+    if isinstance(number, int) and number > FORMAT:
+        rule = f"is newer than {FORMAT}, the newest format that this version reads"
+        raise refused("format", str(number), rule, "install a newer Laufruhe", source)
 
 
 def required(text: str) -> Any:

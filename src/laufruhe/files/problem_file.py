@@ -167,6 +167,7 @@ class UnitsTable(Table):
 class ProblemFile(Table):
     """Problem file."""
 
+    format: f.FormatNumber = 1
     title: str = Field(min_length=1)
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)

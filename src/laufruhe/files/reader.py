@@ -23,7 +23,7 @@ from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, key_path, nearest_file, read_number
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import with_fidelity
-from laufruhe.files.fields import Open
+from laufruhe.files.fields import Open, check_format
 from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
@@ -91,6 +91,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     """Return the problem of the tables of a file; an `InputError` names the file."""
     if "study" in tables:
         raise refused("study", "", "makes this a study file", "use laufruhe study", path)
+    check_format(tables, path)
     try:
         with errors_in_file(path):
             closed, parts = dict(tables), {}

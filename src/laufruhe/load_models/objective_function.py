@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from laufruhe.errors import wrong_call
-from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.load_models.labelled_rows import affine_problem_of, column_names, named_values
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import column_bounds
 from laufruhe.problem.problem import Problem
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ObjectiveFunction:
     """Objective as a function of the decision vector x, for optimisers such as `scipy.optimize.minimize`.
 
@@ -47,9 +49,32 @@ class ObjectiveFunction:
             gradient += weight * norm.pullback(norm.subgradient(vector))
         return self.affine.objective(vector), gradient
 
+    def __repr__(self) -> str:
+        return f"<ObjectiveFunction of {', '.join(self.names)}>"
+
+    @property
+    def constraints(self) -> list[dict[str, Any]]:
+        """Limits as `scipy.optimize.minimize` takes them: the share of each limit that is left, and its gradient.
+
+        Bounds of numbers with an open angle are not among them; `values` moves a vector into these.
+        """
+        return [
+            {"type": "ineq", "fun": partial(_share_left, maximum, norm), "jac": partial(_slope_left, maximum, norm)}
+            for maximum, norm in self.affine.limits
+        ]
+
     def values(self, x: ArrayLike) -> dict[str, float]:
         """Return the values of the open numbers by the names that results use [SI, rad], moved into their sets."""
         return named_values(self.affine.domains, np.array(x, dtype=float))
+
+
+def _share_left(maximum: float, norm: AffineNorm, x: ArrayLike) -> float:
+    return float(maximum - norm.value(np.asarray(x, dtype=float))) / (abs(maximum) or 1.0)
+
+
+def _slope_left(maximum: float, norm: AffineNorm, x: ArrayLike) -> Array:
+    vector = np.asarray(x, dtype=float)
+    return -norm.pullback(norm.subgradient(vector)) / (abs(maximum) or 1.0)
 
 
 def objective_function(problem: Problem) -> ObjectiveFunction:

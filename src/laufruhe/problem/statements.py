@@ -94,7 +94,7 @@ class Statements:
         """Return the objective as a function of the decision vector, which returns the value [SI] and the gradient.
 
         The function has `names`, `start` and `bounds` of its vector, and `values(x)`, the open numbers by the names
-        of results: `scipy.optimize.minimize(f, f.start, jac=True, bounds=f.bounds)`.
+        of results: `scipy.optimize.minimize(f, f.start, jac=True, bounds=f.bounds, constraints=f.constraints)`.
 
         Raises
         ------

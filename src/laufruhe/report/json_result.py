@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.files.fields import FORMAT
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.balance_factor import balance_factors
@@ -50,6 +51,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         points = [{**point, "series": _series(result, k)} for k, point in enumerate(points)]
     no_proof = {"kind": str(Proof.NONE), "lower_bound": None, "gap": None, "kkt_residual": None, "method": ""}
     return {
+        "format": FORMAT,
         "problem": problem.name,
         **_attributes(problem, "title source assumptions"),
         "status": str(result.status),

@@ -13,6 +13,7 @@ from pydantic import BaseModel, BeforeValidator, ValidationError
 
 from laufruhe.errors import InputError, refused, wrong_call
 from laufruhe.files.complaints import complaints_of
+from laufruhe.files.fields import check_format
 from laufruhe.prove.certificate import Certificate
 from laufruhe.report.files import RESULT, write
 from laufruhe.report.json_result import as_json
@@ -120,6 +121,7 @@ def read_result(path: str | Path) -> SavedResult:
     if not isinstance(record, dict) or not {"problem", "status"} <= record.keys():
         rule = "is no result of laufruhe solve or evaluate"
         raise refused("file", "", rule, "give a result.json of one of these commands, or its folder", place)
+    check_format(record, place)
     try:
         file = _File.model_validate(record)
     except ValidationError as error:

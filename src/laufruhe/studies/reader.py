@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from laufruhe.errors import Complaint, InputError, refused
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of
-from laufruhe.files.fields import Table
+from laufruhe.files.fields import FormatNumber, Table, check_format
 from laufruhe.files.reader import tables_and_path
 from laufruhe.files.study_tables import MAX_POINTS, joined
 from laufruhe.studies.kinds import KINDS
@@ -46,6 +46,7 @@ class StudyTable(Table):
 class StudyFile(Table):
     """A whole study file."""
 
+    format: FormatNumber = 1
     title: Annotated[str, Field(min_length=1)]
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)
@@ -73,6 +74,7 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
     Raise `InputError` with one line for each fault: file, key, value, rule, remedy.
     """
     tables, path = tables_and_path(source)
+    check_format(tables, path)
     if "study" not in tables:
         raise refused("study", "", "is missing, so this is not a study file", "use laufruhe solve for a problem", path)
     try:
