@@ -215,8 +215,8 @@ def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list
     """Random designs and random scenes of growing numbers, in one process."""
     found: tuple[list[Cost], list[Cost]] = [], []
     for which, part, maximum in ((0, "designs", evaluations), (1, "engines", solves)):
-        # the two largest have no tables, and differ in draws alone
-        for size in (maximum // 100, maximum // 10, maximum, 4 * maximum):
+        # the two largest of evaluations have no tables, and differ in draws alone
+        for size in (maximum // 100, maximum // 10, maximum, *([4 * maximum] if which == 0 else [])):
             words = {"draws": size, "chunk": 10_000} if which == 0 else {"scenes": size, "few": min(size, 100)}
             here = clusters.prepared(folder / f"{part}{size}", **{**{"draws": 1, "scenes": 1, "points": 2}, **words})
             wall, cores, memory = timed(here, "--jobs", "1")

@@ -195,7 +195,10 @@ def growth() -> tuple[list[str], list[tuple[str, Sequence[int], list[float], flo
     ]
     found = []
     for name, sizes, make in sweeps:
-        times = [seconds(make(n), 15) for n in sizes]
+        works = [make(n) for n in sizes]
+        # in turns, so that a busy minute of the machine slows all sizes
+        rounds = [[seconds(work, 3) for work in works] for _ in range(20)]
+        times = [min(column) for column in zip(*rounds, strict=True)]
         exponent = math.log(times[-1] / times[-3]) / math.log(sizes[-1] / sizes[-3])
         found.append((name, sizes, times, exponent))
         lines.append(
