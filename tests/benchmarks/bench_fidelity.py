@@ -226,7 +226,7 @@ def draw(found: list[tuple[str, Sequence[int], list[float], float]], path: Path)
         axis.set_major_formatter(plain)
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     text = "One evaluation from nothing; beside each line its exponent."
-    style.heading(drawn.figure, "What cost grows with", text, [],
+    style.heading(drawn, "What cost grows with", text, [],
                   "In-line engines without gas, exact kinematics. Computed with Laufruhe.")  # fmt: skip
     style.save(drawn.figure, path)
 

@@ -74,7 +74,7 @@ def draw(trades: list[dict[str, Any]]) -> None:
         "x: designs beyond a limit by the exact model."
     )
     foot = "Left: what a number is off by; right: by how much its design is worse. Computed with Laufruhe."
-    style.heading(drawn.figure, "What cheap fidelities cost", text, [], foot)
+    style.heading(drawn, "What cheap fidelities cost", text, [], foot)
     style.save(drawn.figure, PAGES / "trade.png")
 
 
