@@ -23,6 +23,7 @@ HEAVY = {
     "clarabel",
     "cvxpy",
     "distributed",
+    "ezdxf",
     "jinja2",
     "matplotlib",
     "openpyxl",
