@@ -95,3 +95,32 @@ def test_two_stage_isolator_has_the_textbook_frequencies(ratio: float, frequenci
             sizes.append(np.abs(own.response_at(engine, Receivers((point,), frame), load, w)[1, 0, 2]))
         assert 0 < int(np.argmax(sizes)) < 80
         assert (0.98 + 0.0005 * int(np.argmax(sizes))) == pytest.approx(1.0, abs=1.5e-3)
+
+
+CHAIN = {10.0: (1.3100, 3.054e-4, 2.3316e-4), 25.0: (0.3418, 2.801e-5, 8.1949e-5), 50.0: (0.0630, 2.534e-6, 4.0241e-5),
+         100.0: (0.0148, 2.958e-7, 2.0030e-5)}  # fmt: skip
+"""By frequency [Hz]: mount force per force on the engine, seat acceleration per this force, and per mount force."""
+
+
+@pytest.mark.parametrize("frequency", CHAIN)
+def test_a_seat_on_a_cab_feels_the_force_on_rigid_ground(frequency: float) -> None:
+    """Engine 180 kg, cab 450 kg and driver 75 kg in a vertical chain, by its own three equations of motion."""
+    w = math.tau * frequency
+    k1, k2, k3 = 1.0233e6 * (1.0 + 0.1j), 1.8653e5 + 2969.0j * w, 6662.0 + 424.1j * w
+    chain = np.array([[k1, -k1, 0.0], [-k1, k1 + k2 + k3, -k3], [0.0, -k3, k3]]) - w**2 * np.diag([180.0, 450.0, 75.0])
+    of_engine, of_cab = np.linalg.solve(chain, np.eye(3)[:, :2]).T
+    force, seat = k1 * (of_engine[0] - of_engine[1]), -(w**2) * of_engine[2]
+    printed = CHAIN[frequency]
+    assert [abs(force), abs(seat), abs(seat / force)] == pytest.approx(printed, rel=3.5e-3)
+    # the engine alone on four mounts that stand on rigid ground, and the function of the cab with the engine
+    corners = [(x, y, 0.0) for x in (0.3, -0.3) for y in (0.2, -0.2)]
+    mounts = tuple(Mount(f"m{k}", at, (1.0233e6 / 4.0,) * 3, loss_factor=0.1) for k, at in enumerate(corners))
+    block = Block(180.0, ((20.0, 0.0, 0.0), (0.0, 20.0, 0.0), (0.0, 0.0, 20.0)))
+    engine = Engine("chain", Cycle.FOUR_STROKE, (), mounts=mounts, block=block)
+    row = tuple([0.0, 0.0, complex(-(w**2) * of_cab[2])] * 4)
+    seat_function = FrequencyFunction("f", (0.5 * frequency, 2.0 * frequency), (row, row))
+    receiver = Receiver("seat", "acceleration", None, False, (None, None, seat_function), band=(frequency, frequency))
+    load = np.zeros((2, 6), dtype=complex)
+    load[1, 2] = 1.0
+    answer = own.response_at(engine, Receivers((receiver,)), load, w)[1, 0]
+    assert answer[2] == pytest.approx(seat, rel=SAME)
