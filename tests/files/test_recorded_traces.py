@@ -262,6 +262,7 @@ FORMS = [
     form("zero at bottom", rows(A + 180, P), gas="angle_zero = -180"),
     form("zero at bottom as text", rows(A + 180, P), gas='angle_zero = "-180 deg"'),
     form("cycles with both ends", rows(np.tile(CLOSED, 3), np.tile(CLOSED_P, 3)), said="Of 3 cycles"),
+    form("many cycles with both ends", rows(np.tile(CLOSED, 30), np.tile(CLOSED_P, 30)), said="Of 30 cycles"),
     form("an angle that rises on", rows(LONG, cycle_pressure(LONG)), said="Of 5 cycles"),
     form("an angle that begins anew each turn",
          rows(TURNS, cycle_pressure(np.arange(360.0, 2520.0))), said="Of 3 cycles"),

@@ -48,7 +48,7 @@ def said(engine: str = "", point: str = "", text: str = SINGLE) -> str:
         ("Hub", "did you mean 'stroke', such as"),
         ("Bohrung", "did you mean 'bore', such as"),
         ("Kolben", "did you mean 'reciprocating_mass'"),
-        ("Pleuel", "did you mean 'rod', a table of mass, centre_of_gravity and inertia?"),
+        ("Pleuel", "did you mean 'rod', a table of mass, centre_of_gravity and inertia; its length is rod_length?"),
         (
             "rod_mass",
             "did you mean 'rod', a table of mass, centre_of_gravity and inertia; or add the small end's share to",

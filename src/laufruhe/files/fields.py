@@ -396,4 +396,7 @@ def optional(text: str, default: Any = None) -> Any:
 
 def with_keys(table: type[TableModel], keys: Mapping[str, Any]) -> type[TableModel]:
     """Return a subclass of a table with further keys, each with its type and field."""
-    return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **keys)
+    model = create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **keys)
+    # before pydantic 2.14.1 a model is not copied to another process unless it is built
+    model.model_rebuild()
+    return model

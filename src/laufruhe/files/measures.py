@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
@@ -127,6 +128,10 @@ class ConstraintTable(QuantityTable):
     of: list[str] | None = f.optional("Names of the counterweights or balancers whose mass counts, or of shafts.")
 
 
+# other words for the norm "maximum"
+_HIGHEST = re.compile(r"\b(peak|largest|greatest|highest|max)\b(?! to )")
+
+
 @dataclass(frozen=True)
 class MeasureContext:
     """Engine and operating points that measures refer to."""
@@ -140,7 +145,8 @@ class MeasureContext:
             home = next((home for channel, home in HOMES["channels"].items() if name.endswith(channel)), None)
             if home:
                 raise Refused(where, name, *missing_extension(home))
-            raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
+            usual = _HIGHEST.sub("maximum", name)
+            raise Refused(where, name, "is no quantity", nearest(usual, list(MEASURES)))
         channel, key = MEASURES[name][0], where.rsplit(".", 1)[0]
         if not channel.needs.of(self.engine):
             raise Refused(where, name, f"needs {channel.needs.what}", channel.needs.remedy)

@@ -33,6 +33,8 @@ _LARGER = 3.0
 _FEWEST, _LISTED = 4, 3
 _ROUNDING = 1e-9
 """Noise over the range of the pressure up to which it is that of the arithmetic."""
+_SAME_ANGLE = 1e-9
+"""Difference of angles [rad] that is rounding of many turns."""
 _WHOLE = 0.95
 """Least share of the points of the longest cycle that a cycle has."""
 NEAR_FIRING = math.radians(60.0)
@@ -368,11 +370,13 @@ def _cycles(file: RecordedFile, angles: Array, pressures: Array, period: float) 
     # where angles begin anew, whole turns make them rise on
     drops = np.concatenate([[0.0], np.maximum(-np.diff(angles), 0.0)])
     turns = np.where(drops > math.pi, np.ceil(drops / math.tau - 1e-6), 0.0)
+    # a cycle that gives both ends begins where the one before ends, but for rounding
     angles = angles + math.tau * np.cumsum(turns)
-    back = np.flatnonzero(np.diff(angles) < 0.0)
+    back = np.flatnonzero(np.diff(angles) < -_SAME_ANGLE)
     if len(back):
         late, early = (f"{math.degrees(angles[back[0] + side]):.6g} deg" for side in (1, 0))
         raise file.refused(f"has {late} after {early}", "sort its rows by angle")
+    angles = np.maximum.accumulate(angles)
     step = float(np.median(np.diff(angles)))
     new = np.concatenate([[True], (np.diff(angles) > 1e-3 * step) | np.any(np.diff(pressures, axis=0) != 0.0, axis=1)])
     angles, pressures = angles[new], pressures[new]

@@ -131,8 +131,9 @@ _OF_BEARINGS = frozenset(
     name for name, row in TABLE.items()
     if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.KINKED)
 )  # fmt: skip
-# dependences on unbalances if the weight of moving parts counts (T14)
-_OF_GRAVITY = {STORED_WORK.name: Dependence.AFFINE, IRREGULARITY.name: Dependence.SMOOTH}
+# dependences on unbalances if the weight of moving parts counts (T14); methods that know the degree of irregularity
+# suppose that unbalances leave it as it is
+_OF_GRAVITY = {STORED_WORK.name: Dependence.AFFINE, IRREGULARITY.name: Dependence.UNKNOWN}
 # dependences that are lost at an uneven speed, where loads of parts do not add up
 _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 

@@ -20,7 +20,10 @@ from laufruhe.present.tables import Table
 from laufruhe.problem.problem import Problem
 from laufruhe.units import readable
 
-NOTE = "Throws at a crank angle of 0, the firing dead centre of cylinder 1 (C5). The offset is that of the pin's path."
+NOTE = (
+    "Throws at a crank angle of 0 (C5), which is the firing dead centre of the cylinder that fires at 0. The offset is "
+    "that of the pin's path."
+)
 OF_MOUNTS = "Positions in the axes of the engine (C2). Axes are turned about x, then y, then z (E2)."
 OF_ROTORS = "The unbalance of a throw is its rotating mass times the crank radius. Angles at a crank angle of 0 (C4)."
 

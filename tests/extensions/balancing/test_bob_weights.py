@@ -90,7 +90,7 @@ def test_the_card_has_a_column_for_each_pin_that_differs_and_says_what_the_engin
     sheet = card(problem.engine, weights)
     assert len(sheet.head) == 2 + 4
     assert [row[-2] for row in sheet.rows] == ["500.00", "205.00", "100.00", "805.00", "48300"]
-    assert "600.00 g, but [engine] has 1250.0 g" in sheet.note
+    assert "600.00 g, but reciprocating_mass of [engine] is 1250.0 g" in sheet.note
 
 
 def test_results_have_the_card() -> None:

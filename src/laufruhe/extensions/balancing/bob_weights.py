@@ -87,18 +87,24 @@ def card(engine: Engine, weights: BobWeights) -> Table:
 
 
 def _difference(engine: Engine, weights: BobWeights) -> str:
-    # the engine of the file may have other masses
-    listed = [sum(masses[k] for name, masses in weights.parts if name not in ROTATING)
-              for k in range(len(engine.slider_cranks))]  # fmt: skip
-    worst = max(
-        (abs(mass - part.reciprocating_mass), part.name, mass, part.reciprocating_mass)
-        for mass, part in zip(listed, engine.slider_cranks, strict=True)
-    )
-    if worst[0] <= 1e-4 * worst[3]:
+    # the engine of the file may have other masses; its rotating mass includes that of crank pins
+    pairs = []
+    for k, part in enumerate(engine.slider_cranks):
+        for kind, names in (("reciprocating", RECIPROCATING), ("rotating", ROTATING)):
+            listed = sum(masses[k] for name, masses in weights.parts if name in names)
+            pairs.append((kind, part.name, listed, getattr(part, f"{kind}_mass")))
+    wrong = [
+        (kind, name, listed, mass) for kind, name, listed, mass in pairs
+        if listed - mass > 1e-4 * listed or (kind == "reciprocating" and mass - listed > 1e-4 * mass)
+    ]  # fmt: skip
+    if not wrong:
         return "The reciprocating parts have the mass of [engine]."
     unit, grams = readable("kg", "g")
-    listed_mass, mass = (number(grams * one, 5) for one in worst[2:])
-    return f"The reciprocating parts of {worst[1]} have {listed_mass} {unit}, but [engine] has {mass} {unit}."
+    kind, name, listed, mass = max(wrong, key=lambda pair: abs(pair[2] - pair[3]))
+    return (
+        f"The {kind} parts of {name} have {number(grams * listed, 5)} {unit}, but {kind}_mass of [engine] is "
+        f"{number(grams * mass, 5)} {unit}: loads and weights follow [engine]."
+    )
 
 
 def record(engine: Engine, weights: BobWeights) -> Mapping[str, Any]:
