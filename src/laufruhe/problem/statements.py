@@ -95,6 +95,7 @@ class Statements:
 
         The function has `names`, `start` and `bounds` of its vector, and `values(x)`, the open numbers by the names
         of results: `scipy.optimize.minimize(f, f.start, jac=True, bounds=f.bounds, constraints=f.constraints)`.
+        Methods with absolute tolerances, such as SLSQP, need value and gradient divided by `f(f.start)[0]`.
 
         Raises
         ------
