@@ -22,7 +22,7 @@ from problem_files import PROBLEMS, written
 
 PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
 TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv"}
-DECIDED = {"decisions.csv", "limits.csv", "weights.csv"}
+DECIDED = {"shafts.csv", "decisions.csv", "limits.csv", "weights.csv"}
 ALL_FILES = PAGES | TABLES | DECIDED
 ALL_FILES |= {f"{name}.svg" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
 
@@ -235,11 +235,12 @@ def test_a_tolerance_is_a_share(here: Path, tolerance: str) -> None:
 
 
 def test_the_tolerance_is_used(here: Path) -> None:
-    run("solve", written(here, scenes.TIGHT), "--tolerance", "1e-2", "--no-plots")
+    path = written(here, scenes.TIGHT)
+    run("solve", path, "--tolerance", "1e-2", "--no-plots")
     record = json.loads((here / "results/scene/result.json").read_text(encoding="utf-8"))
     assert record["status"] == "optimal"
     report = (here / "results/scene/report.md").read_text(encoding="utf-8")
-    assert "\nlaufruhe solve scene.toml --no-plots --tolerance 0.01\n" in report
+    assert f"\nlaufruhe solve {path} --no-plots --tolerance 0.01\n" in report
 
 
 class TestUnwritable:

@@ -81,7 +81,7 @@ def shell(words: str, here: Path, **more: str) -> subprocess.CompletedProcess[st
         ("--version >&-", 1, "laufruhe: the output cannot be written"),
         ("check p.toml -q >&- 2>&- <&-", 0, ""),
         ("check - <&-", 2, "stdin: title: is missing"),
-        ("init new.toml <&-", 2, "laufruhe: init: asks questions, but the input is no terminal"),
+        ("init new.toml <&-", 2, "laufruhe: init: asks questions, but the input ended"),
         ("evaluate p.toml --no-plots --out o --json - >&-", 1, "laufruhe: the output cannot be written"),
     ],
 )

@@ -237,6 +237,7 @@ FORMS = [
     form("radians", rows(np.radians(A), P, form="%.8f"), said="Angles are taken as rad"),
     form("radians by unit", rows(np.radians(A), P, form="%.8f", head="theta [rad],p [bar]\n")),
     form("MPa in a row of units", rows(A, P / 10, form="%.7f", head="CA,p\n[deg],[MPa]\n")),
+    form("units in names that are units too", rows(A, P, head="CA [deg],p [bar]\n"), said="from 'CA [deg]', pressure"),
     form("Pa in brackets", rows(A, 1e5 * P, head="phi (deg), p (Pa)\n")),
     form("psia", rows(A, 14.503773773 * P, head="Crank angle (deg), Pressure (psia)\n")),
     form("bar of a gauge", rows(A, P - 1, head="Crank angle (deg), Pressure (barg)\n"), said="gauge, in air of 1 bar"),

@@ -40,9 +40,9 @@ def _requested_source(file: Path) -> str | None:
     # an engine that the user describes has no source
     if file.exists():
         raise refused("file", str(file), *_TAKEN)
-    typer.echo("An engine of the catalogue (laufruhe engines), a ready problem (laufruhe examples),")
+    typer.echo("Start from an engine (laufruhe engines) or a ready problem (laufruhe examples),")
     source: str | None = ask(
-        "or nothing, to describe your own", "", lambda text: _checked_source(text) if text else None
+        "or press Enter to describe your own engine", "", lambda text: _checked_source(text) if text else None
     )
     return source
 

@@ -117,7 +117,7 @@ def ask(words: str, usual: str, read: Callable[[str], Any]) -> Any:
             raise
         typer.echo()
         remedy = "answer it, or add --from with an engine or a ready problem"
-        raise refused("init", words, "has no answer, because the input ended", remedy) from None
+        raise refused("init", "", f"asks questions, but the input ended at '{words}'", remedy) from None
 
 
 def _read(question: _Question, answers: Answers, usual: str, text: str) -> tuple[Answers, bool]:

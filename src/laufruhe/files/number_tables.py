@@ -214,15 +214,19 @@ def _cell(row: Row, column: int) -> str:
     return "" if column >= len(row) or row[column] is None else str(row[column]).strip()
 
 
+def _is_unit(cell: str) -> bool:
+    # "CA [deg]" is a name with its unit; "°CA" and "[deg CA]" are units
+    unit, is_named = unit_in(cell), cell[:1] not in "[(<" and any(map(unit_in, _BRACKETS.findall(cell)))
+    return unit is not None and unit.dimension in _OVER_ANGLE and not is_named
+
+
 def _headings(rows: Sequence[Row], usual: Sequence[int], width: int) -> tuple[tuple[str, ...], tuple[Unit | None, ...]]:
     """Return names and units of columns from the rows over the numbers: the nearest names, and a row of units.
 
     A row of more cells than the `width` of the numbers has names with separators in them.
     """
     aligned = [[_cell(row, column) for column in usual] for row in rows if len(usual) <= len(row) <= width]
-    unit_rows = [
-        cells for cells in aligned if any(unit and unit.dimension in _OVER_ANGLE for unit in map(unit_in, cells))
-    ]
+    unit_rows = [cells for cells in aligned if any(map(_is_unit, cells))]
     name_rows = [cells for cells in aligned if cells not in unit_rows and 2 * sum(map(bool, cells)) >= len(cells)]
     names = tuple(name_rows[-1]) if name_rows else ("",) * len(usual)
     of_names = [_unit_of_name(name) for name in names]

@@ -150,6 +150,7 @@ class RecordedFile:
         self._require_unit(self.columns[0], self.records.si, self.records.name)
         names = [self.name(column) for column in self.columns]
         listed = f"{names[0]} to {names[-1]}" if len(names) > _LISTED else ", ".join(names)
+        listed += " as cycles of one cylinder" if len(names) > 1 else ""
         self.said.insert(0, f"Crank angle from {self.name(self.angle_column)}, {self.records.name} from {listed}.")
 
     def refused(self, rule: str, remedy: str, key: str = "file") -> Refused:

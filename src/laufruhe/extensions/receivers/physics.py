@@ -20,7 +20,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.receivers.machine import Frame, Quantity, Receiver, Receivers, receivers_of
@@ -145,6 +144,8 @@ class _Coupled:
 
     def solved(self, omegas: Array, wrenches: ComplexArray) -> _Motion:
         """Return the motion under wrenches about the origin, shape (n, 6), at positive angular frequencies [rad/s]."""
+        from scipy.linalg import block_diag
+
         mounting, centre, count = self.mounting, self.frame.body.centre_of_gravity, self.shapes.shape[1]
         feet = np.concatenate([_motion_at(mount.position, centre) for mount in mounting.mounts])
         # travel of every mount per motion of both bodies
