@@ -70,7 +70,7 @@ for call in loaded.to_cvxpy, loaded.to_casadi, lambda: laufruhe.solve(problem, s
         print(error)
 for words in (["solve", mounts], ["study", "sweep.toml"]):
     answer = CliRunner().invoke(app, [*words, "--out", folder + words[0]])
-    print(answer.exit_code, answer.stderr.strip().rpartition(": ")[2])
+    print(answer.exit_code, answer.output.strip().rpartition("failed: ")[2] if answer.exit_code else "")
 import xarray
 print(xarray.open_dataset(f"{folder}study/one.nc").attrs["kind"])
 from laufruhe.files.number_tables import _of_spreadsheet

@@ -132,7 +132,7 @@ def test_a_couple_is_in_newton_metres_and_needs_no_mounts(tmp_path: Path, small:
     assert "rms rocking couple, initial [N m]" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     with xr.open_dataset(tmp_path / "out" / "p.nc") as data:
         assert data["objective"].attrs["units"] == "N m"
-        assert data.sizes["mount"] == 0
+        assert not data.sizes.get("mount")
 
 
 def test_sizing_has_every_set_of_shafts_once(tmp_path: Path) -> None:

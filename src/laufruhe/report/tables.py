@@ -79,9 +79,10 @@ def _as_number(cell: str) -> str | float:
 
 
 def _values(entries: Sequence[DecisionValue | LimitValue]) -> Table:
-    return Table(
-        [field.name for entry in entries[:1] for field in fields(entry)], [[*astuple(entry)] for entry in entries]
-    )
+    # both sides of a limit are one cell
+    cells = [[" to ".join(map(str, cell)) if isinstance(cell, tuple) else cell for cell in astuple(entry)]
+             for entry in entries]  # fmt: skip
+    return Table([field.name for entry in entries[:1] for field in fields(entry)], cells)
 
 
 def _measures(result: Result) -> Table:

@@ -207,7 +207,7 @@ def _side_by_side(data: xr.Dataset, words: str) -> p.Picture:
         for k, (name, unit) in enumerate(zip(data["quantity"].values.tolist(), units, strict=True))
     ]
     unit, metric = data["objective"].attrs["units"], data.attrs["metric"]
-    if unit and metric not in [name for name, *_ in quantities]:
+    if unit not in ("", "1") and metric not in [name for name, *_ in quantities]:
         quantities.insert(0, (metric, *readable(unit), data["objective"].values[order]))
     # rows of similar length
     columns = -(-len(quantities) // -(-len(quantities) // MAX_PANELS_OF_RANKS))
