@@ -990,7 +990,7 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
 
 
 def family_of(name: str) -> Callable[[Generator], Table]:
-    """What makes the problems of a family."""
+    """Return the function that makes the problems of a family."""
     from attack.single_families import FAMILIES as SINGLE
 
     return {**FAMILIES, **SINGLE}[name]

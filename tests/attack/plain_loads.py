@@ -401,7 +401,7 @@ def _radians(values: list[Any]) -> list[float]:
 
 
 def own_tables(e: dict[str, Any]) -> dict[int, dict[str, Any]]:
-    """What the file says of single cylinders, by their index."""
+    """Return the row of each single cylinder in the file, by its index."""
     rows = e.get("single_cylinders", [])
     return {
         n - 1: row

@@ -18,7 +18,7 @@ ROWS = {name: (int(lines), float(newtons))
 
 
 def run(name: str) -> tuple[dict[str, Any], str]:
-    """What a listing leaves, and what it prints."""
+    """Return the names that a listing defines, and the text that it prints."""
     names: dict[str, Any] = {}
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):

@@ -66,7 +66,7 @@ def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -
 
 @pytest.mark.parametrize("known", [None, (0.5, np.zeros(2))])
 def test_every_relaxation_of_a_box_counts_once(known: tuple[float, np.ndarray] | None) -> None:
-    """One that was solved before counts too, and is not solved anew."""
+    """A relaxation that was solved before counts too, and is solved once."""
     solved = []
 
     def bound(*ends: np.ndarray) -> tuple[float, np.ndarray]:

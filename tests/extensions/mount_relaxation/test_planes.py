@@ -72,7 +72,7 @@ def test_a_box_without_anything_possible_is_empty() -> None:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_whole_box_is_reached_and_is_the_same_in_every_unit(seed: int) -> None:
-    """Every end by some stiffnesses and angle; what is kept of a box of N/m is what is kept of one of MN/m."""
+    """Some stiffnesses and angles reach every end; a box in N/m is narrowed as the same box in MN/m."""
     generator, unit, kept = np.random.default_rng(seed), 1e-6, 0
     for plane in planes(generator, 20):
         whole = plane.full_box

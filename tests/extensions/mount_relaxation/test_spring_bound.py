@@ -655,7 +655,7 @@ def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
 
 
 def test_a_place_behind_the_middle_is_narrowed_at_both_ends(tmp_path: Path) -> None:
-    """All better designs of a grid stay, and little more, with a number that is negative all over the box."""
+    """The better designs of a grid stay, and little more, though the place is negative all over the box."""
     fixed = MOUNTS.replace(OPEN_STIFFNESS, '"400 N/mm"').replace(
         '["-300 mm"', '[{ between = ["-400 mm", "-50 mm"], start = "-300 mm" }'
     )

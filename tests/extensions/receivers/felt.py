@@ -50,7 +50,7 @@ def weight(name: str, f: np.ndarray) -> np.ndarray:
 
 
 class Felt:
-    """What the receivers of a file feel in a design of it."""
+    """Responses of the receivers of a file in one of its designs."""
 
     def __init__(self, path: Path) -> None:
         self.folder, self.table = path.parent, tomllib.loads(path.read_text(encoding="utf-8"))

@@ -73,7 +73,7 @@ READY = {"motorcycle-handlebar": (1.343006, 1.401994), "tractor-seat": (0.050937
 
 @pytest.mark.parametrize("name", first_fast(READY, 0))
 def test_least_mount_force_is_not_what_is_felt_least(name: str) -> None:
-    """With the figures that the page of receivers tells."""
+    """Both designs have the figures of the page of receivers."""
     path, (best, other) = PROBLEMS / f"{name}.toml", READY[name]
     problem = laufruhe.load(path)
     by_response = laufruhe.solve(problem)

@@ -99,7 +99,7 @@ def test_two_stage_isolator_has_the_textbook_frequencies(ratio: float, frequenci
 
 CHAIN = {10.0: (1.3100, 3.054e-4, 2.3316e-4), 25.0: (0.3418, 2.801e-5, 8.1949e-5), 50.0: (0.0630, 2.534e-6, 4.0241e-5),
          100.0: (0.0148, 2.958e-7, 2.0030e-5)}  # fmt: skip
-"""By frequency [Hz]: mount force per force on the engine, seat acceleration per this force, and per mount force."""
+"""Mount force per force on the engine, seat acceleration per this force and per mount force, by frequency [Hz]."""
 
 
 @pytest.mark.parametrize("frequency", CHAIN)

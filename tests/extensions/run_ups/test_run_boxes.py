@@ -324,7 +324,7 @@ def orders_within(first: Array, second: Array, a: Array, start: Array, load: Arr
 
 @pytest.mark.parametrize("seed", range(8))
 def test_forces_within_a_step_exceed_those_at_its_ends_by_no_more_than_is_told(seed: int) -> None:
-    """One spring or several, a load that jumps, from motion in some orders alone: against the exact motion."""
+    """Forces of one spring or several, under a load that jumps, are compared with the exact motion."""
     r, n = np.random.default_rng(seed), 1 + seed % 3
     frequency, rates, zeros = r.uniform(2.0, 8.0), r.choice([0.0, 1.0], 3), np.zeros((n, n))
     spring, change = frequency * np.eye(n), r.uniform(0.1, 1.0) * np.eye(n)
@@ -397,7 +397,7 @@ def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
 
 
 def stopped(maximum: str, stiffness: str = "300 N/mm", further: tuple[str, ...] = (), **more: Any) -> Problem:
-    """With stops at 1.1 mm, and limits of travel."""
+    """Return a problem with stops at 1.1 mm and limits of travel."""
     limits = [{"name": each, "limit": "run-up travel", "max": each} for each in (maximum, *further)]
     told = random_tables(7, constraints=limits, **more)
     for place in told["mounts"]["places"]:

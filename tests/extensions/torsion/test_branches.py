@@ -60,7 +60,7 @@ def tree(seed: int) -> Torsion:
 
 
 class Full:
-    """All discs at their own angles, and two more without inertia at each gear, which a constraint ties together."""
+    """Equations of discs at their own angles, with two massless discs at each gear, tied by a constraint."""
 
     def __init__(self, chain: Torsion) -> None:
         links = [(a, b, s.stiffness, s.damping) for (a, b, _), s in zip(chain.links, chain.sections, strict=False)]
