@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import laufruhe
@@ -13,11 +14,12 @@ import laufruhe
 SOURCE = Path(laufruhe.__file__).parent
 
 
-def without(name: str, folder: Path) -> dict[str, str]:
-    """Copy the package without an extension, and return the environment of processes that see the copy."""
+def without(names: Sequence[str], folder: Path) -> dict[str, str]:
+    """Copy the package without extensions, and return the environment of processes that see the copy."""
     # compiled modules come along, for compiling all of them takes seconds
     shutil.copytree(SOURCE, folder / "laufruhe")
-    shutil.rmtree(folder / "laufruhe" / "extensions" / name)
+    for name in names:
+        shutil.rmtree(folder / "laufruhe" / "extensions" / name)
     return {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
 
 

@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,18 +15,24 @@ import pytest
 
 import laufruhe
 from extensions.removed_folder import SOURCE, without
+from lanes import first_fast
+from laufruhe import extension
 from laufruhe.extension import HOMES, Tables
+from laufruhe.prove.mounts.provers import PROVERS, Prover
+from laufruhe.solvers import methods
+from laufruhe.solvers.method import Method
 from problem_files import PROBLEMS
 from shared import once
 
 EXTENSIONS = sorted(path.name for path in (SOURCE / "extensions").iterdir() if (path / "__init__.py").exists())
 MAIN = "tractor-four-lanchester"
 STUDY = 'title = "t"\n[study]\n[[study.parts]]\nkind = "{}"\nname = "n"\ntitle = "t"\ncases = []\n'
-# one channel of each extension stands for all
-NEEDS = [
-    (t, n)
-    for t, homes in HOMES.items()
-    for n in (homes if t != "channels" else {h: n for n, h in homes.items()}.values())
+# one entry of each table and extension stands for all
+NEEDS = list({(table, home): (table, name) for table, homes in HOMES.items() for name, home in homes.items()}.values())
+ORDERED = [
+    ("methods", Method, methods._CORE),
+    ("reductions", methods.Reduction, methods.REDUCTIONS),
+    ("provers", Prover, PROVERS),
 ]
 
 
@@ -56,32 +62,35 @@ def words_of(table: Tables, name: str, folder: Path) -> list[str]:
     return [command, str(folder / "asked.toml")]
 
 
-def commands_without(name: str, folder: Path) -> list[list[str]]:
-    """Return the command that solves, then one for each entry of a table that the extension has."""
+def commands_without(names: Sequence[str], folder: Path) -> list[list[str]]:
+    """Return the command that solves, then one for each entry of a table that these extensions have."""
     ends = ["--no-plots", "--out", str(folder / "out"), "--json", str(folder / "result.json")]
-    lacking = [(table, entry) for table, entry in NEEDS if HOMES[table][entry] == name]
-    asked = [words_of(table, entry, folder / f"asked-{k}") for k, (table, entry) in enumerate(lacking)]
-    return [["solve", str(PROBLEMS / f"{MAIN}.toml"), *ends], *asked]
+    needs = [words_of(*need, folder / f"asked-{k}") for k, need in enumerate(lacking(names))]
+    return [["solve", str(PROBLEMS / f"{MAIN}.toml"), *ends], *needs]
+
+
+def lacking(names: Sequence[str]) -> list[tuple[Tables, str]]:
+    return [(table, entry) for table, entry in NEEDS if HOMES[table][entry] in names]
 
 
 @pytest.fixture(scope="module")
-def answers() -> Iterator[Callable[[str], Path]]:
-    """Folder with the answers of commands that see the package without an extension."""
+def answers() -> Iterator[Callable[[Sequence[str]], Path]]:
+    """Folder with the answers of commands that see the package without some extensions."""
     script = str(Path(__file__).with_name("forked_commands.py"))
     streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen([sys.executable, script], text=True, **streams) as server:
 
-        def fill(name: str) -> Callable[[Path], None]:
+        def fill(names: Sequence[str]) -> Callable[[Path], None]:
             def run(folder: Path) -> None:
-                without(name, folder)
-                copy = {"folder": str(folder), "commands": commands_without(name, folder)}
+                without(names, folder)
+                copy = {"folder": str(folder), "commands": commands_without(names, folder)}
                 print(json.dumps(copy), file=server.stdin, flush=True)
                 assert server.stdout.readline() == "done\n", server.stderr.read()
                 shutil.rmtree(folder / "laufruhe")
 
             return run
 
-        yield lambda name: once(f"without-{name}", fill(name))
+        yield lambda names: once(f"without-{'-'.join(names)}", fill(names))
         server.stdin.close()
         server.wait()
 
@@ -96,25 +105,35 @@ def test_every_home_is_there() -> None:
     assert {home for homes in HOMES.values() for home in homes.values()} <= set(EXTENSIONS)
 
 
-@pytest.mark.slow
+def test_nothing_imports_an_extension_of_others_as_it_is_imported() -> None:
+    """So a copy without one imports as the copy without all of them does."""
+    for path in SOURCE.rglob("*.py"):
+        room, own, *_ = [*path.relative_to(SOURCE).parts, ""]
+        names = re.findall(r"^(?:from|import) laufruhe\.extensions\.(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+        assert set(names) <= ({own} if room == "extensions" else set()), path
+
+
 @pytest.mark.parametrize("name", EXTENSIONS)
-def test_the_core_runs_without_an_extension(name: str, answers: Callable[[str], Path]) -> None:
-    folder = answers(name)
+def test_what_others_add_has_its_place_without_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    others = tuple(other for other in extension.extensions() if other.name != name)
+    monkeypatch.setattr(extension, "extensions", lambda: others)
+    for table, kind, core in ORDERED:
+        assert len(extension.in_order(table, kind, core)) >= len(core)
+
+
+REMOVED = [EXTENSIONS, *([name] for name in EXTENSIONS)]
+
+
+@pytest.mark.parametrize("names", first_fast(REMOVED, 0, 1))
+def test_the_core_runs_without_extensions(names: list[str], answers: Callable[[Sequence[str]], Path]) -> None:
+    folder = answers(names)
     solved = answer_of(folder, 0)
     assert solved.status == 0, solved.error
     objective = laufruhe.solve(PROBLEMS / f"{MAIN}.toml").objective
     assert objective is not None
     assert json.loads((folder / "result.json").read_text(encoding="utf-8"))["objective"]["value"] == objective.value
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("table", "name"), NEEDS)
-def test_a_file_or_command_that_needs_it_is_refused_by_its_name(
-    table: Tables, name: str, answers: Callable[[str], Path]
-) -> None:
-    home = HOMES[table][name]
-    lacking = [(t, n) for t, n in NEEDS if HOMES[t][n] == home]
-    refused = answer_of(answers(home), 1 + lacking.index((table, name)))
-    assert refused.status == 2
-    (line,) = refused.error.strip().splitlines()
-    assert f"needs the extension '{home}'" in line
+    for k, (table, name) in enumerate(lacking(names), start=1):
+        refused = answer_of(folder, k)
+        assert refused.status == 2, refused.error
+        (line,) = refused.error.strip().splitlines()
+        assert f"needs the extension '{HOMES[table][name]}'" in line

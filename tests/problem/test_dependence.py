@@ -64,12 +64,11 @@ CONSTANT_HERE = (
 ROUNDING = 1e-9
 STEPS = 60
 FEW = (
-    "study-soft-mounts",
-    "single-rod-length",
-    "opposed-pistons-masses",
-    "tractor-four-shaft-heights",
-    "opposed-pistons-lead",
-)
+    "tractor-four-shaft-heights", "powertrain-torque-roll", "single-rod-length", "opposed-pistons-masses",
+    "geared-three-leads", "diesel-70-hp-flywheel", "inline-five-generator", "geared-inertia", "tractor-four-elastic",
+    "worked-diesel-counterweight",
+)  # fmt: skip
+"""Ready problems that have nearly every entry that any of them has."""
 
 
 def _random(problem: Problem, rng: np.random.Generator) -> Problem:
@@ -176,10 +175,10 @@ def _ready() -> list[Path]:
 
 
 def test_few_engines_refute_no_entry() -> None:
-    assert len(_check([PROBLEMS / f"{name}.toml" for name in FEW], 1)) > 160
+    assert len(_check([PROBLEMS / f"{name}.toml" for name in FEW], 1)) > 380
 
 
-@pytest.mark.parametrize("rounds", first_fast((1, 2), 0, 1))
+@pytest.mark.parametrize("rounds", first_fast((1, 2), 0, 0))
 @pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
 def test_no_engine_refutes_an_entry(rounds: int) -> None:
     seen = _check([*_ready(), ALL_OPEN], rounds)
@@ -190,9 +189,10 @@ def test_no_engine_refutes_an_entry(rounds: int) -> None:
 
 @pytest.mark.slow
 def test_samples_of_one_engine_refute_most_stronger_claims() -> None:
-    """Sample one engine: each stronger claim is refuted, except those of channels that are constant on it."""
+    """Sample one engine: each stronger claim is refuted but of channels that are constant on it, and no entry is."""
     samples: dict[tuple[str, Kind, Dependence], list[list[np.ndarray]]] = {}
-    for _, channel, kind, claim, at in _entries([ALL_OPEN], 5):
+    for _, channel, kind, claim, at in _entries([ALL_OPEN], 3):
+        assert not refuted(claim, at), (channel, kind)
         samples.setdefault((channel.name, kind, claim), []).append(at)
     survivors = {
         (name, kind.name, str(stronger))

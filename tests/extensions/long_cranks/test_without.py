@@ -17,7 +17,7 @@ def test_long_cranks_are_refused_and_short_ones_decided(tmp_path: Path) -> None:
     engines.problem(tmp_path, 12, rest=engines.MOUNTS + engines.MOUNT_FORCE)
     (file,) = tmp_path.glob("*.toml")
     laufruhe.load(file)
-    environment = without("long_cranks", tmp_path / "site")
+    environment = without(["long_cranks"], tmp_path / "site")
     for command in ("check", "solve"):
         refused = run(environment, "-m", "laufruhe", command, file)
         assert refused.returncode == 2

@@ -21,7 +21,7 @@ print(result.status, one.name, f"{one.value:.4g}", decision.kind.name)
 def test_an_open_rod_is_decided_by_local_programs(tmp_path: Path) -> None:
     ready = (PROBLEMS / "single-rod-length.toml").read_text(encoding="utf-8")
     plain = ready[: ready.index("[running_gear]")] + '[objective]\nminimise = "mean shaking force"\n'
-    environment, file = without("sizes", tmp_path / "site"), tmp_path / "rod.toml"
+    environment, file = without(["sizes"], tmp_path / "site"), tmp_path / "rod.toml"
     file.write_text(plain, encoding="utf-8")
     solved = run(environment, "-c", SOLVE, file)
     # the longest rod has the least force of second order
