@@ -81,3 +81,9 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.enable()
+
+
+@pytest.fixture
+def timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trade calls each fidelity once, for tests that ask for no times."""
+    monkeypatch.setattr("laufruhe.studies.trade._MAX_REPEATS", 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 LONG = Path(__file__).with_name("long.txt")
-"""Costly tests of `make test-long`, each with the test of `make test` that shows the same."""
+"""Costly tests of `make test-long`, each with what of `make test` shows the same: a test, or so many of its cases."""
 
 
 def long_and_shorter() -> dict[str, str]:
@@ -21,9 +21,22 @@ def long_and_shorter() -> dict[str, str]:
 
 def mark_long(items: Iterable[pytest.Item]) -> None:
     listed = long_and_shorter()
+    families: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if item.nodeid in listed or item.nodeid.partition("[")[0] in listed:
+        function = item.nodeid.partition("[")[0]
+        if item.nodeid in listed or (function in listed and not listed[function].isdecimal()):
             item.add_marker("long")
+        elif function in listed and item.get_closest_marker("long") is None:
+            families.setdefault(function, []).append(item)
+    for function, cases in families.items():
+        for case in left_out(cases, int(listed[function])):
+            case.add_marker("long")
+
+
+def left_out(cases: Sequence[Any], count: int) -> list[Any]:
+    """Return all cases of a family but so many, which stand at equal steps."""
+    kept = {k * len(cases) // count for k in range(count)}
+    return [case for k, case in enumerate(cases) if k not in kept]
 
 
 def first_fast(values: Iterable[Any], fast: int, usual: int | None = None, long: Collection[Any] = ()) -> list[Any]:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from cli import scenes
@@ -66,7 +67,9 @@ def _evaluated(folder: Path) -> Path:
 
 
 def _traded(folder: Path) -> Path:
-    _run("trade", written(folder, scenes.GIVEN), "--out", folder / "out")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("laufruhe.studies.trade._MAX_REPEATS", 1)
+        _run("trade", written(folder, scenes.GIVEN), "--out", folder / "out")
     return folder / "out" / "scene.html"
 
 

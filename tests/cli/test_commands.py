@@ -346,16 +346,18 @@ def test_evaluate_and_check_need_no_solver(tmp_path: Path) -> None:
     code = (
         "import sys\n"
         "from laufruhe.cli import app\n"
-        "app(sys.argv[1:], standalone_mode=False)\n"
+        "for path in sys.argv[2:]:\n"
+        "    app([sys.argv[1], path, *()], standalone_mode=False)\n"
         "assert not {'cvxpy', 'casadi', 'matplotlib'} & set(sys.modules)\n"
     )
     # a check loads no library that takes as long as all the rest of it
     heavy = ("cvxpy", "casadi", "clarabel", "scipy", "pint", "xarray", "pandas")
     light = code.replace("{'cvxpy', 'casadi', 'matplotlib'}", str({*heavy, "matplotlib"}))
-    for name in ("tractor-four-lanchester", "inline-five-torsion", "tractor-sweeps"):
-        done = in_a_process("check", str(PROBLEMS / f"{name}.toml"), code=light)
-        assert done.returncode == 0, done.stderr
-    done = in_a_process("evaluate", str(path), "--no-plots", "--out", str(tmp_path / "out"), code=code)
+    names = ("tractor-four-lanchester", "inline-five-torsion", "tractor-sweeps")
+    done = in_a_process("check", *(str(PROBLEMS / f"{name}.toml") for name in names), code=light)
+    assert done.returncode == 0, done.stderr
+    ends = ["--no-plots", "--out", str(tmp_path / "out")]
+    done = in_a_process("evaluate", str(path), code=code.replace("*()", f"*{ends}"))
     assert done.returncode == 0, done.stderr
 
 
@@ -364,8 +366,6 @@ def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
     done = in_a_process("check", str(tmp_path / "missing.toml"))
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
-    assert in_a_process("--version").stdout.startswith("laufruhe ")
-    assert in_a_process("solve").returncode == 2
     path = written(tmp_path, scenes.GIVEN)
     done = in_a_process("evaluate", str(path), "--out", str(tmp_path / "out"), "--no-plots")
     assert done.returncode == 0

@@ -17,6 +17,7 @@ from laufruhe.report.screen import PIPE_WIDTH
 from problem_files import PROBLEMS, written
 
 RUN = CliRunner()
+pytestmark = pytest.mark.usefixtures("timed_once")
 
 
 def test_explain_says_what_is_left_out(tmp_path: Path) -> None:

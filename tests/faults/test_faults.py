@@ -219,18 +219,6 @@ def test_a_tab_in_the_title_of_a_study_is_shown_as_one(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["check", str(study)]).stdout == "ok: A\\tsweep, 4 points\n"
 
 
-def test_a_broken_matplotlibrc_in_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import subprocess
-    import sys
-
-    (tmp_path / "matplotlibrc").write_bytes(b"font.size: nonsense\n\xff\xfe\n")
-    path = written(tmp_path, scenes.SHAKING_ONLY)
-    words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", "out"]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "out/cycle.svg").is_file()
-
-
 @pytest.mark.parametrize("name", ["inline-five-open", "vee-six-open", "two-stroke-four-open", "inline-five-uneven-gas"])
 @pytest.mark.parametrize("cylinders", [24, 47, 48])
 def test_many_open_cylinders_are_checked_at_once(name: str, cylinders: int, tmp_path: Path) -> None:

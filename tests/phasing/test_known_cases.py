@@ -190,7 +190,7 @@ def test_reports_say_where_a_bound_is_from(tmp_path):
 
 @pytest.mark.slow
 def test_json_holds_ranking_and_trade():
-    record = as_dict(solved("inline-nine-uneven"))
+    record = as_dict(solved("inline-seven-uneven"))
     assert [star["rank"] for star in record["ranking"]] == list(range(1, len(record["ranking"]) + 1))
     assert record["objective"]["value"] == record["ranking"][0]["objective"]
     assert len(record["phasing"]["trade"]) > 2

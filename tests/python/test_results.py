@@ -45,7 +45,7 @@ def test_a_callback_sees_the_search_and_ends_it(caplog: pytest.LogCaptureFixture
         return bool(progress.design)
 
     with caplog.at_level(logging.INFO, "laufruhe"):
-        found = laufruhe.solve("powertrain-least-force", callback=stop)
+        found = laufruhe.solve("powertrain-joined-springs", callback=stop)
     assert found.status.has_design
     assert found.certificate is not None
     assert found.certificate.method.endswith("stopped at the time limit")

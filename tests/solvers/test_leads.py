@@ -201,13 +201,13 @@ def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
     assert found.certificate.kind is Proof.GLOBAL
     value = objective_value(problem, found.final)
     values = {}
-    for angle in (0, 90, 150, 165, 170, 175, 177, 178, 180):
+    for angle in (90, 165, 175, 178):
         each = solve(loaded(tmp_path, changed(coarse, "{ between = [0, 180], start = 90 }", str(angle))))
         if each.status is Status.OPTIMAL:
             values[angle] = objective_value(each.problem, each.final)
     assert found.certificate.lower_bound <= min(values.values())
     assert value <= min(values.values()) * (1.0 + problem.tolerance)
-    assert set(values) == {150, 165, 170, 175, 177, 178, 180}
+    assert set(values) == {165, 175, 178}
     free = solve(loaded(tmp_path, COUPLED.split("[[constraints]]")[0] + "[fidelity]\nsamples = 120\n"))
     assert objective_value(free.problem, free.final) <= value * (1.0 + 1e-4)
 

@@ -94,7 +94,7 @@ title = "t"
 quantity = "operating_points.1.mean_piston_speed"
 from = "6 m/s"
 to = "12 m/s"
-points = 8
+points = 5
 [[study.parts.cases]]
 name = "single"
 problem = "{PROBLEMS / "tractor-single.toml"}"
@@ -106,12 +106,12 @@ def test_a_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.Monk
     words = ["study", str(written(tmp_path, SWEEP)), "--out", str(tmp_path / "out"), "--jobs", "1"]
     asked = iter(range(100))
     with monkeypatch.context() as patched:
-        patched.setattr("laufruhe.studies.runner.is_time_over", lambda: next(asked) >= 5)
+        patched.setattr("laufruhe.studies.runner.is_time_over", lambda: next(asked) >= 3)
         stopped = CliRunner().invoke(app, words)
     assert stopped.exit_code == 1
     assert "the same command goes on" in stopped.stderr
     kept = tmp_path / "out/.unfinished-points.jsonl"
-    assert kept.read_bytes().count(b"\n\n") == 4
+    assert kept.read_bytes().count(b"\n\n") == 2
     assert {entry.name for entry in (tmp_path / "out").iterdir()} == {kept.name}
     assert CliRunner().invoke(app, words).exit_code == 0
     assert not kept.exists()
@@ -119,6 +119,7 @@ def test_a_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("timed_once")
 def test_a_trade_keeps_what_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, out = written(tmp_path, scenes.TIGHT), tmp_path / "trade"
     stopped = CliRunner().invoke(app, ["trade", str(path), "--out", str(out), "--time-limit", "1e-3"])

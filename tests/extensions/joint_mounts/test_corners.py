@@ -139,7 +139,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
     for lower, upper in boxes_of(problem, generator, 6, 0.08):
         bound = float(boxes.bounds(lower[None], upper[None])[0][0])
         told += bound > 0.0
-        for mounts in generator.uniform(lower, upper, (12, len(lower))):
+        for mounts in generator.uniform(lower, upper, (4, len(lower))):
             at = boxes.loads.at(mounts)
             columns, _ = best_at(at)
             near = [columns, *(columns + 0.05 * generator.normal(size=(4, at.size)) * at.scales)]

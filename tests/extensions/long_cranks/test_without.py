@@ -18,11 +18,10 @@ def test_long_cranks_are_refused_and_short_ones_decided(tmp_path: Path) -> None:
     (file,) = tmp_path.glob("*.toml")
     laufruhe.load(file)
     environment = without(["long_cranks"], tmp_path / "site")
-    for command in ("check", "solve"):
-        refused = run(environment, "-m", "laufruhe", command, file)
-        assert refused.returncode == 2
-        (line,) = (refused.stderr + refused.stdout).strip().splitlines()
-        assert "needs the extension 'long_cranks'" in line
+    refused = run(environment, "-m", "laufruhe", "check", file)
+    assert refused.returncode == 2
+    (line,) = (refused.stderr + refused.stdout).strip().splitlines()
+    assert "needs the extension 'long_cranks'" in line
     ready = PROBLEMS / "vee-twenty-open.toml"
     solved = run(environment, "-c", f"import laufruhe; print(laufruhe.solve('{ready}').objective.value)")
     objective = laufruhe.solve(ready).objective

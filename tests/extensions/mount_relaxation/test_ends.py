@@ -27,7 +27,7 @@ def test_whoever_works_them_out() -> None:
                 boxes = SdpRelaxation(problem, 1.02 * minimum, 1e-3, best.tolist(), ahead)
                 box, solved = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
                 assert box is not None
-                found.append((box, solved, spring_bound(problem, minimum, 1e-2 * minimum, best.tolist()).bound))
+                found.append((box, solved, spring_bound(problem, minimum, 0.1 * minimum, best.tolist()).bound))
                 # those that are asked for are foreseen, though some are not asked for any more
                 assert (ahead.hits > solved // 2) == (executor is pool)
     (box, solved, bound), (other, counted, proven) = found

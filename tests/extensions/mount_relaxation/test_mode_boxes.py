@@ -182,4 +182,4 @@ def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly(
         if value <= 1.02 * minimum:
             assert np.all((found[0][:4] <= x) & (x <= found[1][:4]))
     assert np.prod((found[1] - found[0])[:4] / (boxes.upper - boxes.lower)[:4]) < 0.5
-    assert 0.0 < spring_bound(problem, minimum, 1e-2 * minimum, best.tolist()).bound <= minimum
+    assert 0.0 < spring_bound(problem, minimum, 0.1 * minimum, best.tolist()).bound <= minimum

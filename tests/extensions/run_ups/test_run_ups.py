@@ -14,7 +14,7 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections import tables_of
 from laufruhe.report.tables import number_tables
-from laufruhe.solvers import Status, evaluate_only
+from laufruhe.solvers import evaluate_only
 from problem_files import PROBLEMS, loaded
 
 RPM = np.pi / 30.0
@@ -33,7 +33,7 @@ def soft() -> str:
 
 @pytest.mark.slow
 def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
-    """Where the best design without it keeps it, that stays proven; what no stiffness keeps is named."""
+    """Where the best design without it keeps it, that stays proven."""
     soft += "[search]\nstarts = 1\n"
     alone = laufruhe.solve(loaded(tmp_path, soft))
     kept = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))
@@ -41,11 +41,6 @@ def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
     assert kept.certificate.kind == alone.certificate.kind
     found = next(limit for limit in kept.limits if limit.name == "run-up travel")
     assert 0.0 < found.value < 2e-3
-    quick = RUN.replace("0.5 s", "0.2 s").replace("0.8 s", "0.2 s")
-    broken = laufruhe.solve(loaded(tmp_path, soft + quick + limited("0.1 mm")))
-    assert broken.status is Status.INFEASIBLE
-    assert broken.certificate is None
-    assert broken.conflict == ("run-up travel",)
     record = as_dict(kept)["run_up"]
     assert record["up_to"] == pytest.approx(1000.0 * RPM)
     assert max(record[way]["travel"] for way in ("up", "down")) == found.value

@@ -103,7 +103,7 @@ def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
     domains = domains_of(problem.unbalances)
     measure = problem.objective[0].measure
     known: tuple = ()
-    for _ in range(20):
+    for _ in range(8):
         low, high = np.sort(model.lower + rng.random((2, 3)) * (model.upper - model.lower), axis=0)
         # what dual rows of the box before say, too
         bound, cut = boxes.objective(low, high, known), boxes.cut(low, high, np.inf)
@@ -139,7 +139,7 @@ def test_masses_of_weights_are_limited_beside_sizes(solved: Result) -> None:
     limited = changed(
         FIXED_ROD, "[fidelity]", '[[constraints]]\nlimit = "added mass"\nof = ["w"]\nmax = "0.2 kg"\n[fidelity]'
     )
-    result = laufruhe.solve(laufruhe.load(limited).changed(tolerance=10 * TOLERANCE))
+    result = laufruhe.solve(laufruhe.load(limited).changed(tolerance=30 * TOLERANCE))
     assert result.certificate.kind is Proof.GLOBAL
     assert result.limits[-1].value <= 0.2 * (1.0 + 1e-5)
     assert result.objective.value >= solved.certificate.lower_bound
@@ -191,7 +191,7 @@ max = "7 N/mm^2"
 limit = "maximum rod stress"
 max = "60 N/mm^2"
 [fidelity]
-samples = 360
+samples = 120
 """
 
 
@@ -240,7 +240,8 @@ def test_a_weight_beside_the_length_of_the_rod_is_proven() -> None:
 
 
 def test_a_stress_itself_may_be_minimised() -> None:
-    result = laufruhe.solve(changed(FEWER, "mean shaking force", "maximum crank-pin bending stress"))
+    text = changed(FEWER, "mean shaking force", "maximum crank-pin bending stress")
+    result = laufruhe.solve(laufruhe.load(text).changed(tolerance=TOLERANCE))
     assert result.certificate.kind is Proof.GLOBAL
     pin = next(entry for entry in result.decisions if entry.name == "engine.big_end.diameter")
     assert pin.at_bound

@@ -55,7 +55,7 @@ def test_orders_that_answer_most_choose_the_sides_of_three_numbers() -> None:
     problem = laufruhe.load(INPUTS / "pulley-shaft-and-pendulum.toml")
     boxes, generator = TwistBoxes(problem, evaluate(problem)), np.random.default_rng(83)
     low, high = boxes.coordinates.lower, boxes.coordinates.upper
-    draws = [low + (high - low) * generator.random(3) for _ in range(400)]
+    draws = [low + (high - low) * generator.random(3) for _ in range(200)]
     minimum = min(objective_value(problem, evaluate(problem, problem.design(list(map(float, x))))) for x in draws)
     bound = bisect_box(boxes, low, high, minimum, problem.tolerance * minimum, 600).bound
     # by the gain of any order the same boxes left four fifths
