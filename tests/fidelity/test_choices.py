@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import ready
+import laufruhe
 import tractor
 from cli import scenes
 from fidelity.scenes import random_elastic_problem, random_problem
@@ -123,7 +123,7 @@ def test_threads_of_the_machine_change_a_rounding() -> None:
         [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True, cwd=ROOT,
         env={**os.environ, **dict.fromkeys(NAMES, count)},
     ).stdout  # fmt: skip
-    found = ready.solved("tractor-four-lanchester")
+    found = laufruhe.solve(load(PROBLEMS / "tractor-four-lanchester.toml"))
     here = [found.objective.value, found.certificate.lower_bound, choose(found.problem, 1e-3).error_estimate]
     assert [float(word) for word in answer.split()] == pytest.approx(here, rel=1e-11)
 
