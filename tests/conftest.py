@@ -84,6 +84,7 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture
-def timed_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trade calls each fidelity once, for tests that ask for no times."""
-    monkeypatch.setattr("laufruhe.studies.trade._MAX_REPEATS", 1)
+def small_trade(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A trade calls each fidelity once, for a few designs and scenes: for tests that ask for no times."""
+    for name, count in (("_MAX_REPEATS", 1), ("DESIGNS", 100), ("SCENES", 2)):
+        monkeypatch.setattr(f"laufruhe.studies.trade.{name}", count)

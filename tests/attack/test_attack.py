@@ -41,7 +41,8 @@ MORE = {
     ("open-vees", 1), ("sizes", 100013), ("uneven crankcase", 1101), ("vee", 3), ("radial", 5), ("parts", 5),
     ("single cylinders", 103), ("single gas", 102), ("single stars", 104),
     ("yokes", 4), ("chambers", 5), ("worst means", 2), ("root mean quads", 11), ("convex-mounts", 1),
-    ("elastic-few", 1), ("inline", 1), ("open-vees", 130), ("gas", 4), ("convex-mounts", 0), ("prices of elastic-balance", 1),
+    ("elastic-few", 1), ("inline", 1), ("open-vees", 130), ("gas", 4), ("convex-mounts", 0),
+    ("prices of elastic-balance", 1),
 }  # fmt: skip
 """Costly ones, of families that keep another, here or in the tests below."""
 DRAWN = [(family, seed) for family, seeds in SEEDS.items() for seed in seeds]

@@ -75,7 +75,7 @@ BROKEN = {
     "half a price": ("locomotive-balanced-share", scaled(AffineNorm, "dual_norm", times(0.5))),
     "cuts of stars": ("two-stroke-four-open", scaled(Cut, "_sums", times(1.02))),
     "stars one by one": ("vee-twenty-open", scaled(even_search, "enumerate_stars", least_times(1.02))),
-    "windows of throws": ("inline-seven-uneven", scaled(uneven_throws, "uneven_bound", lambda found: found + 1e3)),
+    "windows of throws": ("inline-nine-uneven", scaled(uneven_throws, "uneven_bound", lambda found: found + 1e3)),
     "throws": ("steam-two-crank", scaled(ThrowPrograms, "_bound", first_times(1.02))),
     "the flywheel": ("scotch-yoke-steam-pump", scaled(MonotoneProblem, "minimum_over", times(1.02))),
     "leads": ("geared-three-leads", scaled(LeadBoxes, "bound", value_times(1.01))),

@@ -22,12 +22,6 @@ from problem_files import PROBLEMS
 run = CliRunner()
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def test_every_ready_problem_has_a_use() -> None:
     assert sorted(ready()) == sorted(path.stem for path in PROBLEMS.glob("*.toml"))
     listed = run.invoke(app, ["examples"]).output

@@ -27,13 +27,6 @@ ALL_FILES = PAGES | TABLES | DECIDED
 ALL_FILES |= {f"{name}.svg" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty current folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def run(*words: object) -> Result:
     result = CliRunner().invoke(app, [str(word) for word in words])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception

@@ -17,7 +17,7 @@ from laufruhe.report.screen import PIPE_WIDTH
 from problem_files import PROBLEMS, written
 
 RUN = CliRunner()
-pytestmark = pytest.mark.usefixtures("timed_once")
+pytestmark = pytest.mark.usefixtures("small_trade")
 
 
 def test_explain_says_what_is_left_out(tmp_path: Path) -> None:

@@ -29,12 +29,6 @@ COMMANDS = ("init", "examples", "engines", "solve", "evaluate", "study", "check"
 SINGLE = PROBLEMS / "tractor-single.toml"
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_of_every_command_has_an_example(command: str) -> None:
     short, long = (run.invoke(app, [command, flag]) for flag in ("-h", "--help"))

@@ -16,7 +16,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 FILE = re.compile(r"^Save this as `([\w.-]+\.toml)`.*:\n\n```toml\n((?:.*\n)*?)```", re.MULTILINE)
 BLOCK = re.compile(r"^```(console|pycon)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("timed_once")]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("small_trade")]
 
 
 def blocks(page: Path, kind: str) -> list[str]:

@@ -109,7 +109,9 @@ def test_nothing_imports_an_extension_of_others_as_it_is_imported() -> None:
     """So a copy without one imports as the copy without all of them does."""
     for path in SOURCE.rglob("*.py"):
         room, own, *_ = [*path.relative_to(SOURCE).parts, ""]
-        names = re.findall(r"^(?:from|import) laufruhe\.extensions\.(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE)
+        names = re.findall(
+            r"^(?:from|import) laufruhe\.extensions\.(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE
+        )
         assert set(names) <= ({own} if room == "extensions" else set()), path
 
 

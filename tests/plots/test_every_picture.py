@@ -42,7 +42,9 @@ MODELS = (
 # the first of these that has a picture of a kind is looked at for it; `make test-long` looks at all that each has
 
 
-@pytest.mark.parametrize(("name", "whole"), first_fast([(name, k > 0) for k in (0, 1) for name in MODELS], 3, len(MODELS)))
+@pytest.mark.parametrize(
+    ("name", "whole"), first_fast([(name, k > 0) for k in (0, 1) for name in MODELS], 3, len(MODELS))
+)
 def test_no_picture_has_a_fault(name: str, whole: bool) -> None:
     result = ready.solved(name)
     earlier = {of for other in MODELS[: MODELS.index(name)] for of in names(ready.solved(other))}

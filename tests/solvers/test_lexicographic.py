@@ -196,7 +196,7 @@ def test_a_first_that_nothing_meets_is_told_as_of_one(tmp_path: Path) -> None:
     assert solve(loaded(tmp_path, limited)).status is Status.INFEASIBLE
 
 
-@pytest.mark.usefixtures("timed_once")
+@pytest.mark.usefixtures("small_trade")
 def test_a_trade_is_of_the_first_objective(tmp_path: Path) -> None:
     one, two = (trade(loaded(tmp_path, text)) for text in (TWO.replace(TWO[TWO.rindex("[[objective]]") :], ""), TWO))
     assert two.problem.ranks == ()

@@ -177,7 +177,7 @@ def test_no_search_finds_better(case: str, load: str, tmp_path: Path) -> None:
     assert result.objective.value <= searched * (1.0 + 2e-3) + 1e-6 * result.objective.initial
 
 
-@pytest.mark.usefixtures("timed_once")
+@pytest.mark.usefixtures("small_trade")
 def test_a_trade_decides_places_too(tmp_path: Path) -> None:
     """Every fidelity of a trade is solved as the problem is: more physics left out, no better design."""
     text = _engine([0, 180]) + _shaft(x=_between(-200, 50), unbalance=_between(0.0, 0.03, " kg m"))

@@ -119,7 +119,7 @@ def test_a_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("timed_once")
+@pytest.mark.usefixtures("small_trade")
 def test_a_trade_keeps_what_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, out = written(tmp_path, scenes.TIGHT), tmp_path / "trade"
     stopped = CliRunner().invoke(app, ["trade", str(path), "--out", str(out), "--time-limit", "1e-3"])

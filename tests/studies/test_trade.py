@@ -72,7 +72,7 @@ def test_a_call_is_repeated_unless_it_takes_seconds(first: float, calls: int, mo
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("timed_once")
+@pytest.mark.usefixtures("small_trade")
 def test_rows_are_what_separate_calls_return() -> None:
     """Values exactly; times are compared by benchmarks."""
     problem = load(PROBLEMS / "tractor-single.toml")
@@ -90,7 +90,7 @@ def test_rows_are_what_separate_calls_return() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("timed_once")
+@pytest.mark.usefixtures("small_trade")
 def test_an_index_lists_what_nothing_is_traded_for(tmp_path: Path) -> None:
     paths = [PROBLEMS / f"{name}.toml" for name in ("waterworks-steam-pump", "boxer-four")]
     found, page, _ = traded(paths, tmp_path / "trade", lambda _: None)
@@ -104,7 +104,7 @@ def test_an_index_lists_what_nothing_is_traded_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("timed_once")
+@pytest.mark.usefixtures("small_trade")
 def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of several problems side by side; the rest is an error that counts them."""
     quick, never = PROBLEMS / "boxer-four.toml", PROBLEMS / "inline-five.toml"

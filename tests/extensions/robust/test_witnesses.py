@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import laufruhe
+from claims.test_broken_bounders import Break, bound_times, scaled, value_times
 from laufruhe.errors import BoundError
 from laufruhe.extensions.robust import assembly_solver, worst_case
 from laufruhe.extensions.robust.assembly import Assembly, assemble
@@ -24,31 +24,11 @@ from laufruhe.solvers.result import Status
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft, written
 from ready import solved
 
-Break = Callable[[pytest.MonkeyPatch], None]
-
 
 @pytest.fixture(autouse=True)
 def whole_walks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave no step out for want of time."""
     monkeypatch.setattr(walk, "SECONDS", 20.0)
-
-
-def scaled(owner: Any, name: str, change: Callable[[Any], Any]) -> Break:
-    """Change the answers of a function."""
-    whole = getattr(owner, name)
-
-    def broken(*given: Any, **named: Any) -> Any:
-        return change(whole(*given, **named))
-
-    return lambda patch: patch.setattr(owner, name, broken)
-
-
-def value_times(factor: float) -> Callable[[Any], Any]:
-    return lambda found: replace(found, value=found.value * factor)
-
-
-def bound_times(factor: float) -> Callable[[Any], Any]:
-    return lambda found: replace(found, bound=found.bound * factor)
 
 
 ROBUST = (
