@@ -86,5 +86,5 @@ def pytest_collection_finish() -> None:
 @pytest.fixture
 def small_trade(monkeypatch: pytest.MonkeyPatch) -> None:
     """A trade calls each fidelity once, for a few designs and scenes: for tests that ask for no times."""
-    for name, count in (("_MAX_REPEATS", 1), ("DESIGNS", 100), ("SCENES", 2)):
+    for name, count in (("_MAX_REPEATS", 1), ("DESIGNS", 100), ("SCENES", 1)):
         monkeypatch.setattr(f"laufruhe.studies.trade.{name}", count)
