@@ -46,11 +46,25 @@ def test_results_and_rows_are_labelled() -> None:
     datasets = [laufruhe.evaluate_many(FOUR, designs), *laufruhe.load(FOUR).affine().values()]
     for name in (FOUR, "powertrain-least-force", "tractor-four-bearings"):
         result = laufruhe.evaluate(name)
-        datasets += [result.forces(36), result.orders()]
+        datasets += [result.forces(36), result.orders(), result.harmonics()]
     datasets.append(laufruhe.evaluate("powertrain-least-force").modes())
     assert {name for data in datasets for name in data} >= {"mount_travel", "main_bearing_force", "slope", "energy"}
     for data in datasets:
         assert unlabelled(data) == []
+
+
+def test_harmonics_sum_to_the_loads_over_the_crank_angle() -> None:
+    """f(phi) = Re sum c e^{i h phi}, on elastic mounts, without the kinks that gas has beyond the listed orders."""
+    result = laufruhe.evaluate("inline-five-elastic")
+    harmonics, forces, orders = result.harmonics(), result.forces(72), result.orders()
+    angle = np.radians(forces.angle)
+    for name in ("shaking_force", "shaking_moment", "mount_force"):
+        total = (harmonics[name] * np.exp(1j * harmonics.order * angle)).sum("order").real
+        xr.testing.assert_allclose(total.transpose(*forces[name].dims), forces[name], rtol=1e-9, atol=1e-8)
+        alternating = abs(harmonics[name]).max("direction") - 1e-9
+        assert bool((alternating <= orders[name]).all()), name
+    hertz = harmonics.frequency.isel(design=0, point=0)
+    assert np.allclose(hertz, harmonics.order * result.problem.points[0].speed / (2.0 * np.pi))
 
 
 @pytest.mark.slow

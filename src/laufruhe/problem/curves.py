@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -67,7 +67,7 @@ class Field:
     words: str
     unit: str
     own_axes: tuple[CurveAxis, ...]
-    values: Array
+    values: Array | ComplexArray
 
     def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
         """Yield heading and array index of each table column of the field: one for each combination of its axes."""
@@ -145,14 +145,11 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     """Return the loads on block, mounts and bearings, and the mount travel, at `steps` angles of the cycle (C7)."""
     check_integer("steps", steps, 1, MAX_STEPS)
     first = next(iter(designs.values()))
-    cycle, direction, fields = first.engine.cycle, CurveAxis("direction", ("x", "y", "z")), []
+    cycle, fields = first.engine.cycle, []
     for name, words, unit, axes, signal, part in _signals(first, _WRENCH):
         spectra = [[with_common_base(cycle.base_order, [signal(x)])[0] for x in d.loads] for d in designs.values()]
         values = np.array([[spectrum.sample(steps) for spectrum in row] for row in spectra])[..., part]
-        if values.shape[-1] == len(direction.labels):
-            fields.append(Field(name, words, unit, (*axes, direction), values))
-        else:
-            fields.append(Field(name, words, unit, axes, values[..., 0]))
+        fields.append(_vector_field(name, words, unit, axes, values))
     angles = CurveAxis("angle", tuple(float(k) for k in np.degrees(cycle.angle) * np.arange(steps) / steps), "deg")
     rows = (CurveAxis("point", tuple(loads.point.name for loads in first.loads)), angles)
     return Fields("Loads over the crank angle", CurveAxis("design", tuple(designs)), rows, tuple(fields))
@@ -160,29 +157,60 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
 
 def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
     """Return the amplitudes by order of the loads on block, mounts and bearings (C8)."""
+
+    def amplitudes(name: str, words: str, unit: str, axes: tuple[CurveAxis, ...], series: ComplexArray) -> Field:
+        # a resonance has no finite amplitude
+        with np.errstate(invalid="ignore"):
+            values = order_amplitude(series)
+        return Field(name, words, unit, axes, np.where(np.isfinite(values), values, math.inf))
+
+    return _by_order("Amplitudes by order", designs, (*_WRENCH, *_MOMENTS), amplitudes)
+
+
+def harmonics_of(designs: Mapping[str, Evaluation]) -> Fields:
+    """Return the complex coefficients c by order h of the same loads: f(phi) = Re sum c e^{i h phi} (C8)."""
+    harmonics = _by_order("Complex coefficients by order", designs, _WRENCH, _vector_field)
+    speeds = np.array([loads.point.speed for loads in next(iter(designs.values())).loads])
+    frequencies = np.outer(speeds, harmonics.rows[1].labels) / math.tau
+    return replace(
+        harmonics,
+        fields=(*harmonics.fields, Field("frequency", "frequency", "Hz", (), np.array([frequencies] * len(designs)))),
+    )
+
+
+def _by_order(
+    title: str,
+    designs: Mapping[str, Evaluation],
+    parts: Sequence[tuple[str, str, slice]],
+    field_of: Callable[[str, str, str, tuple[CurveAxis, ...], ComplexArray], Field],
+) -> Fields:
+    """Return fields of complex coefficients, which `field_of` takes in shape (designs, points, orders, ...)."""
     first = next(iter(designs.values()))
     base = common_base([loads.wrench.base for design in designs.values() for loads in design.loads])
-    signals = list(_signals(first, (*_WRENCH, *_MOMENTS)))
+    signals = list(_signals(first, parts))
     spectra = [
         [[signal(loads).with_finer_base(base) for loads in design.loads] for design in designs.values()]
         for *_, signal, _ in signals
     ]
     count = max(len(spectrum.coefficients) for of_signal in spectra for row in of_signal for spectrum in row)
 
-    def amplitudes(coefficients: ComplexArray) -> Array:
-        # a resonance has no finite amplitude
-        with np.errstate(invalid="ignore"):
-            values = order_amplitude(coefficients)
-        values = np.pad(values, [(0, count - len(values))] + [(0, 0)] * (values.ndim - 1))
-        return np.where(np.isfinite(values), values, math.inf)
+    def padded(series: ComplexArray) -> ComplexArray:
+        return np.pad(series, [(0, count - len(series))] + [(0, 0)] * (series.ndim - 1))
 
     fields = [
-        Field(name, words, unit, axes, np.array([[amplitudes(s.coefficients[..., part]) for s in row] for row in rows]))
+        field_of(name, words, unit, axes, np.array([[padded(s.coefficients[..., part]) for s in row] for row in rows]))
         for (name, words, unit, axes, _, part), rows in zip(signals, spectra, strict=True)
     ]
     orders = CurveAxis("order", tuple(float(k * base) for k in range(count)))
     points = CurveAxis("point", tuple(loads.point.name for loads in first.loads))
-    return Fields("Amplitudes by order", CurveAxis("design", tuple(designs)), (points, orders), tuple(fields))
+    return Fields(title, CurveAxis("design", tuple(designs)), (points, orders), tuple(fields))
+
+
+def _vector_field(name: str, words: str, unit: str, axes: tuple[CurveAxis, ...], values: Any) -> Field:
+    """Return a field of vectors with an axis of directions, or of numbers if the last axis of values has length 1."""
+    if values.shape[-1] == 1:
+        return Field(name, words, unit, axes, values[..., 0])
+    return Field(name, words, unit, (*axes, CurveAxis("direction", ("x", "y", "z"))), values)
 
 
 def modes_of(designs: Mapping[str, Evaluation]) -> Fields:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import LaufruheWarning, ModelError, wrong_call
 from laufruhe.fidelity.error_bounds import regret_bound
-from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
+from laufruhe.problem.curves import STEPS, forces_of, harmonics_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
@@ -228,6 +228,13 @@ class Result(ResultContent):
     def orders(self) -> xr.Dataset:
         """Return amplitudes of loads and mount deflections by order [xarray]."""
         return orders_of(self._with_loads).dataset()
+
+    def harmonics(self) -> xr.Dataset:
+        """Return the complex coefficients c of loads and mount displacements by order and direction [xarray].
+
+        At crank angle phi the load is Re sum c e^{i h phi}: |c| is the amplitude of order h, arg c its phase (C8).
+        """
+        return harmonics_of(self._with_loads).dataset()
 
     def modes(self) -> xr.Dataset:
         """Return natural frequencies, loss factors, energy shares and shapes of a block on elastic mounts [xarray].
