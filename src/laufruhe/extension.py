@@ -98,7 +98,7 @@ _OF_SIZES = (
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
-    "commands": {"page": "served_page", "balance": "balancing", "drawing": "workshop"},
+    "commands": {"page": "served_page", "balance": "balancing", "drawing": "workshop", "export": "exchange"},
     "keys": {
         "torsion": "torsion",
         "tolerances": "robust",

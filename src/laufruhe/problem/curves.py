@@ -207,7 +207,7 @@ def _by_order(
 
 
 def _vector_field(name: str, words: str, unit: str, axes: tuple[CurveAxis, ...], values: Any) -> Field:
-    """Return a field of vectors with an axis of directions, or of numbers if the last axis of values has length 1."""
+    # values are numbers if their last axis has length 1, else vectors
     if values.shape[-1] == 1:
         return Field(name, words, unit, axes, values[..., 0])
     return Field(name, words, unit, (*axes, CurveAxis("direction", ("x", "y", "z"))), values)

@@ -15,8 +15,11 @@ from laufruhe.numerics.libraries import library_versions
 from laufruhe.version import __version__
 
 MADE_BY = {"made_by": "laufruhe"}
-_BEGIN = re.compile(rb'(\[\s*)?{\s*"made_by": "laufruhe"')
-LONGEST_BEGIN = 200
+_BEGIN = re.compile(
+    rb'(\[\s*)?{\s*"made_by": "laufruhe"|([#$] | +-1\n +164\n +1|CDF[\1\2].*)made by laufruhe ', re.DOTALL
+)
+"""Start of a file of this package: JSON, a text with comments, a universal file, or netCDF-3."""
+LONGEST_BEGIN = 1000
 """Number of bytes at the start of a file that must name its maker."""
 
 
@@ -26,7 +29,7 @@ def versions() -> dict[str, str]:
 
 
 def is_ours(path: Path) -> bool:
-    """Return True if a file may be overwritten: it is empty, or begins as JSON of this package does."""
+    """Return True if a file may be overwritten: it is empty, or begins as files of this package do."""
     with suppress(OSError), path.open("rb") as stream:
         begin = stream.read(LONGEST_BEGIN)
         return not begin or _BEGIN.match(begin) is not None

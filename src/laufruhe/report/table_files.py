@@ -24,9 +24,13 @@ MAX_PAGE_ROWS = 10_000
 _CREATED = datetime(2000, 1, 1, tzinfo=UTC)
 
 
-def write_csv(table: Table, path: Path) -> None:
-    """Write a table as comma-separated values: numbers in full precision, no text that a spreadsheet computes."""
+def write_csv(table: Table, path: Path, comments: Iterable[str] = ()) -> None:
+    """Write a table as comma-separated values: numbers in full precision, no text that a spreadsheet computes.
+
+    Comments are lines above the head, each behind a #.
+    """
     with path.open("w", encoding="utf-8", newline="") as stream:
+        stream.writelines(f"# {comment}\n" for comment in comments)
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(map(_csv_cell, table.head))
         writer.writerows(zip(*map(_csv_column, zip(*table.rows, strict=True)), strict=True))
