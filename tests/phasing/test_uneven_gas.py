@@ -67,6 +67,7 @@ def moved(moves, x):
 @pytest.mark.parametrize("name", SCENES)
 def test_every_order_is_that_of_the_exact_model(tmp_path, name, monkeypatch):
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
+    monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
     phasing, start, moves = scene(tmp_path, name)
     rng = np.random.default_rng(3)
     for _ in range(3):
@@ -86,6 +87,7 @@ def test_every_order_is_that_of_the_exact_model(tmp_path, name, monkeypatch):
 @pytest.mark.parametrize("name", SCENES)
 def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name, monkeypatch):
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
+    monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
     rms = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "rms")
     phasing, start, moves = scene(tmp_path, name, rms)
     x = ca.SX.sym("x", moves.size)

@@ -89,7 +89,7 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Throws, bank, split pin and weight drawn at random; every order kept."""
-    monkeypatch.setattr(uneven_model, "INSIDE_LEFT_OUT", 1e-9)
+    monkeypatch.setattr(uneven_model, "LEFT_OUT", 1e-9)
     monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
     engine, throws, told = SCENES[name]
     problem = problem_of(engine, "rms main-bearing force", throws, **told)

@@ -7,12 +7,14 @@ crankcase, because one cylinder may load the pins and bearings of another.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from laufruhe.machine import Chambers, Engine, Rotor, SliderCrank
 from laufruhe.machine.chambers import CylinderGases
+from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import ComplexArray
+from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.problem import Problem
 
 BANK_SAMPLES = (0.0, 0.5 * math.pi, math.pi)
@@ -32,6 +34,21 @@ def isolate_cylinder(engine: Engine, k: int, keep_places: bool, part: SliderCran
     active = engine.slider_cranks[k] if part is None else part
     with_idle = [active if j == k else massless_copy(idle) for j, idle in enumerate(engine.slider_cranks)]
     return replace(engine, slider_cranks=tuple(with_idle) if keep_places else (active,), rotors=(), load_torque=None)
+
+
+def evaluate_cylinders(
+    problem: Problem, layout: Layout, banks_are_open: bool, keep_places: bool
+) -> Iterator[tuple[Evaluation, ...]]:
+    """Yield loads of every cylinder alone, at its dead centre at crank angle zero.
+
+    The loads are those at its own bank angle, or at each of `BANK_SAMPLES` if bank angles are open.
+    """
+    for k, part in enumerate(problem.engine.slider_cranks):
+        delay = layout.firing_delays[k] if layout.firing_delays else 0.0
+        banks = BANK_SAMPLES if banks_are_open else (layout.banks[k],)
+        copies = (replace(part, bank=bank, throw=bank, firing_angle=delay) for bank in banks)
+        alone = only_gas_of(problem, part.name)
+        yield tuple(evaluate(alone, isolate_cylinder(problem.engine, k, keep_places, copy)) for copy in copies)
 
 
 def isolate_rotors(engine: Engine, rotors: Sequence[Rotor], keep_places: bool) -> Engine:

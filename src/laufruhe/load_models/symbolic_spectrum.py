@@ -52,19 +52,6 @@ class SymbolicSpectrum:
         return SymbolicSpectrum(self.orders, ca.horzcat(*real), ca.horzcat(*imaginary))
 
 
-def sum_spectra(spectra: Sequence[SymbolicSpectrum]) -> SymbolicSpectrum:
-    """Return the sum of spectra with equal components, order by order."""
-    orders = np.unique(np.concatenate([spectrum.orders for spectrum in spectra]))
-    real, imaginary = 0.0, 0.0
-    for spectrum in spectra:
-        selection = ca.DM.zeros(len(spectrum.orders), len(orders))
-        for k, column in enumerate(np.searchsorted(orders, spectrum.orders)):
-            selection[k, int(column)] = 1.0
-        selection = ca.sparsify(selection)
-        real, imaginary = real + spectrum.real @ selection, imaginary + spectrum.imaginary @ selection
-    return SymbolicSpectrum(orders, real, imaginary)
-
-
 def cosines_and_sines(orders: Sequence[float], base: float, samples: int) -> tuple[Any, Any]:
     """Return cosines and sines of orders at equal steps over the period of order `base`, shape (n, samples) each."""
     angles = 2.0 * np.pi / base * np.arange(samples) / samples

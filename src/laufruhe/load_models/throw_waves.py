@@ -22,11 +22,9 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MAX_NUMBERS, AffineModel, AffineNorm
 from laufruhe.load_models.isolated_cylinders import (
-    BANK_SAMPLES,
-    isolate_cylinder,
+    evaluate_cylinders,
     isolate_rotors,
     motored,
-    only_gas_of,
     split_by_bank,
 )
 from laufruhe.machine.layouts import Layout
@@ -175,20 +173,11 @@ class ThrowWaves:
         self.rest.base = self.base
 
     def _cylinders(self, inside: bool) -> Iterator[MovingPart]:
-        # each cylinder at its dead centre at crank angle zero; loads inside the crankcase keep the idle cylinders
-        engine, layout = self.problem.engine, self.layout
-        for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
-            problem, delay = (
-                only_gas_of(self.problem, part.name),
-                layout.firing_delays[k] if layout.firing_delays else 0.0,
-            )
-            banks = BANK_SAMPLES if self._is_geometry_open.bank else (layout.banks[k],)
-            copies = (replace(part, bank=bank, throw=bank, firing_angle=delay) for bank in banks)
-            evaluations = tuple(evaluate(problem, isolate_cylinder(engine, k, inside, copy)) for copy in copies)
+        layout, (bank_is_open, split_is_open) = self.layout, self._is_geometry_open
+        for k, evaluations in enumerate(evaluate_cylinders(self.problem, layout, bank_is_open, inside)):
             # fixed angles shift the cylinder in time
-            ahead = 0.0 if self._is_geometry_open.bank else -layout.banks[k]
-            ahead += 0.0 if self._is_geometry_open.split else layout.pin_offsets[k]
-            yield MovingPart(pin, k, evaluations, ahead, {})
+            ahead = (0.0 if bank_is_open else -layout.banks[k]) + (0.0 if split_is_open else layout.pin_offsets[k])
+            yield MovingPart(layout.pins[k], k, evaluations, ahead, {})
 
     def _unbalances(self, rotor_throws: dict[str, int], inside: bool) -> Iterator[MovingPart]:
         # unbalances on every throw

@@ -1,8 +1,14 @@
-"""Measures of loads as smooth CasADi expressions of throws, bank angle, split pin and unbalances (S19).
+"""Measures of loads as smooth CasADi expressions of throws, bank angle, split pin and unbalances (S19, S23, S37).
 
-The load of a cylinder turns with its throw and leans with its bank. Its gas follows the firing dead centre
-phi_k = 2 pi l_k - (theta_k + o_k - beta_k), with throw theta_k, pin offset o_k and bank angle beta_k. The number of
-turns l_k belongs to the firing order, and is fixed (S23). A rotor on a throw turns with it.
+A cylinder that fires at crank angle zero has the load A_h in order h with its axis upright, B_h with the axis a quarter
+turn further, and D_h upside down. With its axis at bank angle b and its throw at s = theta + o - b - 2 pi l, where o is
+the pin offset and l the whole turns before its firing, which the firing order fixes, the load is
+
+    e^{i h s} ((A_h - D_h) / 2 cos b + (B_h - C_h) sin b + C_h),     C_h = (A_h + D_h) / 2,
+
+because the load turns with the axis, except for its components along and about the crankshaft. The load of an unbalance
+U is Re U times that of unbalance 1 plus Im U times that of unbalance i, in the order of its shaft. A rotor on a throw
+turns with it.
 """
 
 from __future__ import annotations
@@ -10,39 +16,38 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
+from laufruhe.load_models.isolated_cylinders import (
+    BANK_SAMPLES,
+    evaluate_cylinders,
+    isolate_rotors,
+    motored,
+    split_by_bank,
+)
 from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
-from laufruhe.load_models.turned_loads import OrderSelection, turned_loads
 from laufruhe.machine import OperatingPoint, Rotor
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
-from laufruhe.numerics.spectrum import Spectrum, as_order
-from laufruhe.physics.mount_forces import RigidMounting
-from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
-from laufruhe.problem import channels
-from laufruhe.problem.channels import LoadChannel
+from laufruhe.numerics.spectrum import Spectrum, stacked_coefficients
 from laufruhe.problem.decision import Domain, domains_of
+from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure, counted_rotors, narrow_signal, radius_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
-MIN_SAMPLES = 72
-NEGLIGIBLE, LEFT_OUT = 1e-9, 1e-2
-"""Largest share of the root mean square in the omitted orders: of forces, and of the roll moment of gas."""
-INSIDE_LEFT_OUT, HIGHEST = 1e-2, 24.0
-"""Largest share for loads inside the crankcase, and highest order: a jump of the pressure has orders without end."""
-ROLL = 3
-"""Index of the roll moment in a wrench."""
+MIN_SAMPLES, SAMPLES_PER_ORDER = 72, 6
+# relative size of an order that counts as zero
+_NEGLIGIBLE = 1e-12
+# largest share of the root mean square of a component in omitted orders: of the lowest orders, their number, and of
+# the others up to the highest; gas and jumps of the pressure have orders without end
+LOW_LEFT_OUT, LOWEST, LEFT_OUT, HIGHEST = 1e-9, 24, 1e-3, 24.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,20 +86,29 @@ class UnevenModel:
     def __init__(self, problem: Problem, layout: Layout, rotor_throws: dict[str, int], symbols: UnevenSymbols) -> None:
         self.problem, self._rotor_throws, self._symbols = problem, rotor_throws, symbols
         self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
-        self._mounting = mounting_of(problem.engine, problem.fidelity)
         parts = problem.engine.slider_cranks
         firsts = [layout.pins.index(pin) for pin in range(len(layout.throw_positions))]
         self._start = [parts[k].throw - layout.pin_offsets[k] for k in firsts]
-        self._wrenches: dict[OperatingPoint, SymbolicSpectrum] = {}
-        # star angle and bank angle of every cylinder
-        self._angles = []
-        for k, part in enumerate(parts):
+        engine, inside = problem.engine, any(measure.is_inside for measure in problem.measures)
+        # loads that add up: evaluations, the factor of each, and the angle by which their phases are ahead
+        self._sources: list[tuple[Sequence[Evaluation], Sequence[Any], Any]] = []
+        cylinders = evaluate_cylinders(problem, layout, symbols.bank is not None, inside)
+        for k, (part, cylinder) in enumerate(zip(parts, cylinders, strict=True)):
             side = layout.side(k)
             bank = side * symbols.bank if symbols.bank is not None else part.bank
             offset = -side * symbols.split if symbols.split is not None else layout.pin_offsets[k]
             # the firing order fixes the number of turns before the firing
             turns = round((part.firing_angle + part.throw - part.bank) / math.tau)
-            self._angles.append((symbols.throws[layout.pins[k]] + offset - bank - math.tau * turns, bank))
+            angle = symbols.throws[layout.pins[k]] + offset - bank - math.tau * turns
+            self._sources.append((cylinder, (ca.cos(bank), ca.sin(bank), 1.0)[-len(cylinder) :], angle))
+        if engine.load_torque is not None:
+            fixed = replace(isolate_rotors(engine, (), inside), load_torque=engine.load_torque)
+            self._sources.append(((evaluate(motored(problem), fixed),), (1.0,), 0.0))
+        self._gas_and_inertia = sum(len(evaluations) for evaluations, _, _ in self._sources)
+        for rotor in engine.rotors:
+            units = [isolate_rotors(engine, [replace(rotor, unbalance=u)], inside) for u in (1.0, 1.0j)]
+            pair = [evaluate(motored(problem), unit) for unit in units]
+            self._sources.append((pair, ca.vertsplit(self._unbalance(rotor)), 0.0))
 
     def rows(self, measure: Measure) -> tuple[Any, Grid]:
         """Return the vectors (rows) whose norm is a measure, shape (k, d), as CasADi expressions, and their grid (P1).
@@ -105,101 +119,57 @@ class UnevenModel:
             counted = counted_rotors(measure, self.problem.engine.rotors)
             rows = [(self._unbalance(r) / radius_of(r)).T for r in counted]
             return ca.vertcat(*rows), Grid(np.ones(len(rows)), 1)
-        chosen = [point for point in self.problem.points if measure.includes_point(point)]
+        engine, chosen = self.problem.engine, [point for point in self.problem.points if measure.includes_point(point)]
         total_weight = sum(point.weight for point in chosen)
+        # one spectrum for each mount, one for the block, or one for each place inside the crankcase
+        by_point = [
+            self._load(point, lambda loads: narrow_signal(measure, measure.load.signal(loads), engine))
+            for point in chosen
+        ]
         blocks: list[Any] = []
         weights: list[Array] = []
         if measure.norm.is_euclidean:
-            for point in chosen:
-                places = self._signal(measure, point)
+            for point, places in zip(chosen, by_point, strict=True):
                 half = np.where(places[0].orders == 0.0, 1.0, 0.5) * point.weight / total_weight / len(places)
                 blocks += [part.T for place in places for part in (place.real, place.imaginary)]
                 weights += [half] * (2 * len(places))
             return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
-        # rigid mounts have one map for all orders, so that the wrench can be sampled first
-        is_mapped_later = measure.channel is channels.MOUNT_FORCE and isinstance(self._mounting, RigidMounting)
-        signals = [[self._counted(measure, p)] if is_mapped_later else self._signal(measure, p) for p in chosen]
         # orders differ between points: all have the samples that the highest order needs
-        highest = max(float(place.orders.max()) / place.base for places in signals for place in places)
+        highest = max(float(place.orders.max()) / place.base for places in by_point for place in places)
         steps = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
-        for point, places in zip(chosen, signals, strict=True):
-            values = [place.sampled(steps) for place in places]
-            if is_mapped_later:
-                values = [values[0] @ ca.DM(m.real).T for m in self._maps(measure, 0.0, point)]
-            blocks += values
-            weights.append(np.full(len(values) * steps, point.weight / total_weight / len(values) / steps))
+        for point, places in zip(chosen, by_point, strict=True):
+            blocks += [place.sampled(steps) for place in places]
+            weights.append(np.full(len(places) * steps, point.weight / total_weight / len(places) / steps))
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
-    def _signal(self, measure: Measure, point: OperatingPoint) -> list[SymbolicSpectrum]:
-        # one spectrum for each mount, one for the block, or one for each place inside the crankcase
-        if measure.is_inside:
-            # loads inside the crankcase, by every place (S37)
-            return self._turned(
-                point,
-                lambda loads: narrow_signal(
-                    measure, measure.load.signal(loads).series, self.problem.engine
-                ).truncated(HIGHEST),
-                [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True,
-            )  # fmt: skip
-        counted = self._counted(measure, point)
-        if isinstance(measure.channel, LoadChannel) and measure.channel.part is not None:
-            return [counted.mapped(np.eye(6)[measure.channel.part])]
-        by_order = [self._maps(measure, float(h), point) for h in counted.orders]
-        return [counted.map_orders(maps) for maps in zip(*by_order, strict=True)]
+    def wrench(self, point: OperatingPoint) -> SymbolicSpectrum:
+        """Return the symbolic wrench on the block at an operating point."""
+        return self._load(point, lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :]))[0]
 
-    def _turned(
-        self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum], selections: Sequence[OrderSelection],
-        keep_places: bool,
-    ) -> list[SymbolicSpectrum]:  # fmt: skip
-        return turned_loads(
-            self.problem, point, signal, selections, keep_places, self._angles,
-            self._symbols.bank is not None, self._unbalance,
-        )  # fmt: skip
+    def _load(self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum]) -> list[SymbolicSpectrum]:
+        """Return a load at one operating point as an expression of throw and bank angles, one spectrum per place.
 
-    def _counted(self, measure: Measure, point: OperatingPoint) -> SymbolicSpectrum:
-        gain: Callable[[float], float] | None = None
-        if measure.on_mounts and not isinstance(self._mounting, RigidMounting):
-            # only the lowest orders of gas move a block on soft mounts
-            gain = partial(self._roll_gain, measure, point.speed)
-        wrench = self.wrench(point, gain)
-        counted = np.flatnonzero(measure.counted(wrench.orders))
-        if len(counted):
-            return wrench.select(counted)
-        return SymbolicSpectrum(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
-
-    def _roll_gain(self, measure: Measure, speed: float, order: float) -> float:
-        return float(np.abs(self._map(measure, order, speed)[:, :, ROLL]).max())
-
-    def _maps(self, measure: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
-        weights = np.diag(measure.direction_weights or (1.0, 1.0, 1.0))
-        maps = self._map(measure, order, point.speed)
-        return [weights @ maps[k] for k in measure.places([mount.name for mount in self.problem.engine.mounts])]
-
-    def _map(self, measure: Measure, order: float, speed: float) -> NDArray[np.complex128]:
-        if self._mounting is None:
-            raise ValueError("an engine without mounts has no mount forces")
-        if measure.channel is channels.MOUNT_FORCE:
-            return mount_maps(self._mounting, order, speed)
-        base = as_order(order)
-        units = np.stack([np.zeros((6, 6)), np.eye(6)]).astype(complex)
-        spectra = [Spectrum(base or Fraction(1), units[:, k] if base else units[1:, k]) for k in range(6)]
-        travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
-        return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
-
-    def wrench(self, point: OperatingPoint, gain: Callable[[float], float] | None = None) -> SymbolicSpectrum:
-        """Return the symbolic wrench on the block at an operating point.
-
-        `gain` weights each order of the roll moment when negligible orders are dropped.
+        `signal` is a function from the loads of an engine to the load, shape (n, places, d).
         """
-        if gain is None and point in self._wrenches:
-            return self._wrenches[point]
-        share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else LEFT_OUT
-        unweighted = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
-        roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain or (lambda _: 1.0))
-        (wrench,) = self._turned(point, _as_place, [*unweighted, roll], False)
-        if gain is None:
-            self._wrenches[point] = wrench
-        return wrench
+        p = self.problem.points.index(point)
+        signals = [signal(part.loads[p]).series.truncated(HIGHEST) for parts, _, _ in self._sources for part in parts]
+        base, stacked = stacked_coefficients(signals, self.problem.engine.cycle.base_order)
+        places, d = stacked.shape[2:]
+        stacked = stacked.reshape(*stacked.shape[:2], places * d)
+        count = self._gas_and_inertia
+        is_needed = _needed_orders(np.square(np.abs(stacked[:count])).sum(axis=0)) | stacked[count:].any(axis=(0, 2))
+        orders, rows = np.asarray(np.flatnonzero(is_needed) * float(base)), iter(stacked[:, is_needed])
+        real, imaginary = ca.DM(places * d, len(orders)), ca.DM(places * d, len(orders))
+        for parts, factors, angle in self._sources:
+            values = tuple(next(rows) for _ in parts)
+            terms = split_by_bank(*values) if len(values) == len(BANK_SAMPLES) else values
+            a = sum(_dm(coefficients.real.T) * factor for coefficients, factor in zip(terms, factors, strict=True))
+            b = sum(_dm(coefficients.imag.T) * factor for coefficients, factor in zip(terms, factors, strict=True))
+            phases = ca.DM(orders).T * angle
+            cosine, sine = (ca.repmat(wave(phases), places * d, 1) for wave in (ca.cos, ca.sin))
+            real, imaginary = real + a * cosine - b * sine, imaginary + a * sine + b * cosine
+        by_place = [slice(k * d, (k + 1) * d) for k in range(places)]
+        return [SymbolicSpectrum(orders, real[place, :], imaginary[place, :]) for place in by_place]
 
     def _unbalance(self, rotor: Rotor) -> Any:
         """Return the unbalance of a rotor as expressions (re, im) [kg m], at the present angle of its throw."""
@@ -223,10 +193,6 @@ class UnevenModel:
         turn = self._symbols.throws[pin] - self._start[pin]
         cosine, sine = ca.cos(turn), ca.sin(turn)
         return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
-
-
-def _as_place(loads: PointLoads) -> Spectrum:
-    return loads.wrench.mapped(lambda wrench: wrench[:, None, :])
 
 
 def rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
@@ -254,3 +220,16 @@ def rotor_states(problem: Problem) -> dict[str, tuple[complex, ...]]:
         for drive in decision.rotor_drives:
             gains[drive.rotor].append(drive.gain)
     return {rotor.name: (rotor.unbalance, *gains[rotor.name]) for rotor in problem.engine.rotors}
+
+
+def _needed_orders(squares: Array) -> Mask:
+    # orders that any component needs, from the squares of the coefficients, shape (orders, components)
+    tail = np.cumsum(squares[::-1], axis=0)[::-1]
+    left_out = np.where(np.arange(len(squares)) < LOWEST, LOW_LEFT_OUT, LEFT_OUT)[:, None]
+    mask = ((tail > left_out**2 * tail[0]) & (squares > _NEGLIGIBLE**2 * tail[0])).any(axis=1)
+    return np.asarray(mask if mask.any() else np.arange(len(squares)) == 0)
+
+
+def _dm(values: Array) -> Any:
+    # sparse, because gas has many orders but few components
+    return ca.sparsify(ca.DM(np.ascontiguousarray(values)))
