@@ -62,10 +62,10 @@ def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[flo
     rng = np.random.default_rng(5)
     names = [decision.name for decision in given.unbalances]
     assert len(names) == 4
-    still, ridden = names[:1], names[1:]
+    still = names[:1]
     assert still[0].startswith("still")
     for _ in range(4):
-        values, y = [], np.zeros(found.matrix.shape[1])
+        values, y, first = [], np.zeros(found.matrix.shape[1]), 0
         for decision in given.unbalances:
             own_set = decision.set
             if own_set.width == 2:
@@ -76,8 +76,8 @@ def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[flo
                 value = size * own_set.directions[0]
                 # counted from the end nearest to nothing, so that none is negative
                 parts = [own_set.upper - size if own_set.upper <= 0.0 else size - own_set.lower]
-            first = 0 if decision.name in still else found.shared[ridden.index(decision.name)]
             y[first : first + len(parts)] = parts
+            first += len(parts)
             values.append(value)
         for domain in found.domains:
             # inside the set of every column

@@ -40,14 +40,11 @@ class BoxColumns:
         Matrix from columns of the box to columns of the model, shape (columns of the model, columns of the box).
     limits
         Limits that couple the columns of one decision.
-    shared
-        First column of every decision with riders.
     """
 
     domains: tuple[Domain, ...]
     matrix: Array
     limits: tuple[tuple[float, AffineNorm], ...]
-    shared: tuple[int, ...]
 
 
 class _Rider(NamedTuple):
@@ -125,7 +122,6 @@ class Riders:
         sets: list[Set] = []
         entries: dict[tuple[int, int], float] = {}
         couplings: list[tuple[float, list[tuple[int, float]]]] = []
-        shared = []
 
         def add_columns(values: Set) -> int:
             sets.append(values)
@@ -142,7 +138,6 @@ class Riders:
         for group in self._groups:
             values, fixed = _shift_to_zero(group.decision.set), group.fixed
             first = add_columns(values)
-            shared.append(first)
             if fixed is not None:
                 entries |= {(fixed.start + k, first + k): 1.0 for k in range(values.width)}
             # an unbalance with a free angle does not depend on its throw
@@ -181,24 +176,7 @@ class Riders:
                     slope[k, 0, column] = sign / maximum
             grid = Grid(np.ones(len(slope)), len(slope))
             limits = ((0.5, AffineNorm(NORMS["maximum"], np.full((len(slope), 1), -0.5), slope, grid)),)
-        return BoxColumns(domains_of(decisions), matrix, limits, tuple(shared))
-
-    def spread(self, columns: BoxColumns, y: Array, middle: Array) -> list[tuple[int, int, float]]:
-        """Return how far the relaxation of a box splits each unbalance that turns with a throw [kg m].
-
-        The list has throw, column of the model and error for each. The error is the distance between two values of the
-        unbalance: the relaxed one, from the values `y` of the columns of a box, and the one at the throw angles
-        `middle` [rad], shape (throws,).
-        """
-        x, distances = columns.matrix @ y, []
-        for group, shared in zip(self._groups, columns.shared, strict=True):
-            values = _shift_to_zero(group.decision.set)
-            value = sum(complex(y[shared + k]) * direction for k, direction in enumerate(values.directions))
-            for rider in group.riders:
-                expected = rider.drive.of(value) * np.exp(1j * (middle[rider.pin] - self._throws[rider.pin]))
-                difference = complex(x[rider.column], x[rider.column + 1]) - expected
-                distances.append((rider.pin, rider.column, abs(difference)))
-        return distances
+        return BoxColumns(domains_of(decisions), matrix, limits)
 
 
 def _shift_to_zero(values: Set) -> Set:

@@ -30,8 +30,6 @@ from laufruhe.prove.throws.arcs import ArcBox, Arcs
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.throws.riding_weights import BoxColumns, Riders
 
-# rounds in which a box shrinks, and the share of its sides from which another round does not pay
-_ROUNDS, _SHRINKAGE = 6, 0.8
 # width of a side that is not divided any more [rad]
 NARROWEST = 1e-9
 # number of multipliers to try on other boxes
@@ -52,22 +50,16 @@ class ThrowProgram:
     rows
         Norms with all columns: unbalances; for every throw the cosines and sines of all waves, then theta; and the
         shared angles.
-    reduced
-        Norms without the columns of negligible orders, for the program that proposes multipliers.
     names
         Names of the limits; empty for the firing intervals.
     order_sizes
         Size of every throw's orders in objective and limits, shape (throws, orders).
-    unbalance_sizes
-        Size of the columns of unbalances in objective and limits, shape (columns,).
     """
 
     window: FiringWindow
     rows: AffineProblem
-    reduced: AffineProblem
     names: tuple[str, ...]
     order_sizes: Array
-    unbalance_sizes: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,36 +138,21 @@ class ThrowPrograms:
             return replace(program, window=window)
         intervals = self._intervals(window)
         rows = replace(program.rows, limits=(*program.rows.limits, (1.0, intervals)))
-        reduced_limits = (*program.reduced.limits, (1.0, self._without_negligible_orders(intervals)))
-        reduced = replace(program.reduced, limits=reduced_limits)
-        return replace(program, window=window, rows=rows, reduced=reduced, names=(*program.names, ""))
+        return replace(program, window=window, rows=rows, names=(*program.names, ""))
 
     def _with_laps(self, window: FiringWindow) -> ThrowProgram:
         """Return objective and limits for all firing orders with the same whole turns, for any firing intervals."""
         terms = tuple((weight, self._rows(norm, window.laps)) for weight, norm in self._terms)
         limits = tuple((limit.maximum + norm.left_out, self._rows(norm, window.laps)) for limit, norm in self._limits)
         count = len(self.waves.orders)
-        order_sizes, unbalance_sizes = np.zeros((self.waves.throws, count)), np.zeros(self._riders.size)
+        order_sizes = np.zeros((self.waves.throws, count))
         for _, norm in (*terms, *limits):
             size = np.linalg.norm(norm.slope.reshape(norm.constant.size, -1), axis=0)
             by_order = self._columns_by_throw(size)
             by_order = np.hypot(by_order[:, :count], by_order[:, count : 2 * count])
             order_sizes += by_order / (float(by_order.max()) or 1.0)
-            unbalance_sizes += size[: self._riders.size] / (float(by_order.max()) or 1.0)
-        reduced = AffineProblem(
-            tuple((weight, self._without_negligible_orders(norm)) for weight, norm in terms),
-            tuple((maximum, self._without_negligible_orders(norm)) for maximum, norm in limits), (), 1,
-        )  # fmt: skip
         names = tuple(limit.name for limit, _ in self._limits)
-        return ThrowProgram(window, AffineProblem(terms, limits, (), 1), reduced, names, order_sizes, unbalance_sizes)
-
-    def _without_negligible_orders(self, norm: AffineNorm) -> AffineNorm:
-        count, followed = len(self.waves.orders), np.arange(self._order_count)
-        of_throw = np.concatenate([followed, count + followed, [2 * count]])
-        throws = self._riders.size + (2 * count + 1) * np.arange(self.waves.throws)
-        shared = np.arange(throws[-1] + 2 * count + 1, norm.slope.shape[-1])
-        columns = np.concatenate([np.arange(self._riders.size), np.add.outer(throws, of_throw).ravel(), shared])
-        return replace(norm, slope=norm.slope[..., columns])
+        return ThrowProgram(window, AffineProblem(terms, limits, (), 1), names, order_sizes)
 
     def _columns_by_throw(self, columns: Array) -> Array:
         width = 2 * len(self.waves.orders) + 1
@@ -235,32 +212,10 @@ class ThrowPrograms:
         -------
         The box, or `FathomedPart` if it has no such design.
         """
-        result: ThrowBox | FathomedPart = INFEASIBLE_PART
-        for _ in range(_ROUNDS):
-            window_bounds = program.window.within(lower, upper)
-            if window_bounds is None:
-                return INFEASIBLE_PART
-            lower, upper = window_bounds
-            result = self._bound_box(program, lower, upper, floor, cutoff, reuse_multipliers)
-            if isinstance(result, FathomedPart):
-                return result
-            if float(np.sum(result.upper - result.lower)) > _SHRINKAGE * float(np.sum(upper - lower)):
-                return result
-            lower, upper, floor = result.lower, result.upper, result.bound
-        return result
-
-    def parts(self, box: ThrowBox, cutoff: float) -> Iterator[ThrowBox | FathomedPart]:
-        """Yield the two parts of a box of throws, divided at the mean angle of the mixture with the largest spread."""
-        width = box.upper - box.lower
-        spread = np.where(width > NARROWEST, box.spread, 0.0)
-        side = int(np.argmax(spread if spread.any() else width))
-        for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
-            yield self.box(box.program, *half, box.bound, cutoff)
-
-    def _bound_box(
-        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float, reuse_multipliers: bool
-    ) -> ThrowBox | FathomedPart:
-        """Return a box with its lower bound of the objective, by multipliers of other boxes or by its cone program."""
+        window_bounds = program.window.within(lower, upper)
+        if window_bounds is None:
+            return INFEASIBLE_PART
+        lower, upper = window_bounds
         columns = self._riders.columns(*self.waves.throw_bounds(lower, upper))
         arc_box = ArcBox(self.waves.orders[: self._order_count], lower, upper)
         for proof in self._proofs if reuse_multipliers else ():
@@ -268,7 +223,7 @@ class ThrowPrograms:
             if value - self.truncation >= cutoff or self._prove_infeasible(program, columns, proof, arc_box):
                 self._store_proof(proof)
                 return FathomedPart(cutoff)
-        mixture = Mixture(program, columns, lower, upper, self.waves.orders[: self._order_count])
+        mixture = Mixture(program, columns, lower, upper, self.waves.orders)
         solution = solve_cones(mixture.problem)
         multipliers = solution.multipliers
         if solution.x is None:
@@ -286,10 +241,15 @@ class ThrowPrograms:
             return FathomedPart(cutoff)
         middle, spread = mixture.middle(solution.x)
         middle = np.clip(middle, *ends)
-        arcs_at_middle, _ = self.waves.throw_bounds(middle, middle)
-        for pin, column, distance in self._riders.spread(columns, solution.x[: mixture.unbalances], arcs_at_middle):
-            spread[pin] += float(program.unbalance_sizes[column]) * distance
         return ThrowBox(program, *ends, max(value, floor), middle, spread)
+
+    def parts(self, box: ThrowBox, cutoff: float) -> Iterator[ThrowBox | FathomedPart]:
+        """Yield the two parts of a box of throws, divided at the mean angle of the mixture with the largest spread."""
+        width = box.upper - box.lower
+        spread = np.where(width > NARROWEST, box.spread, 0.0)
+        side = int(np.argmax(spread if spread.any() else width))
+        for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
+            yield self.box(box.program, *half, box.bound, cutoff)
 
     def _bound(
         self, rows: AffineProblem, columns: BoxColumns, multipliers: Multipliers, arc_box: ArcBox
@@ -359,14 +319,12 @@ class Mixture:
     ----------
     problem
         Cone program; its columns are unbalances, then shares of the angles.
-    unbalances
-        Number of columns of unbalances.
     """
 
     def __init__(self, program: ThrowProgram, columns: BoxColumns, lower: Array, upper: Array, orders: Array) -> None:
-        self.unbalances, self._orders = columns.matrix.shape[1], orders
+        unbalances, self._orders = columns.matrix.shape[1], orders
         throws, shared_count = len(program.order_sizes), orders.shape[1] - 1
-        rows, self._weights = program.reduced, program.order_sizes[:, : len(orders)]
+        rows, self._weights = program.rows, program.order_sizes
         is_significant = self._weights > _NEGLIGIBLE * self._weights.max()
         step_limits = (_MAX_STEPS[shared_count],) * throws + (_MAX_SHARED_STEPS[shared_count],) * shared_count
         side_orders = [
@@ -383,7 +341,7 @@ class Mixture:
         self._angles, shared = side_angles[:throws], list(product(*side_angles[throws:]))
         self._shared = np.array(shared).reshape(len(shared), shared_count)
         places = np.concatenate([[0], np.cumsum([len(shared) - 1, *(len(shared) * (n - 1) for n in steps[:throws])])])
-        self._places, size = self.unbalances + places, int(self.unbalances + places[-1])
+        self._places, size = unbalances + places, int(unbalances + places[-1])
         shared_phases = (self._shared @ self._orders[:, 1:].T)[:, None]
         points = []
         for angles in self._angles:
@@ -395,7 +353,7 @@ class Mixture:
             slope = np.zeros((*norm.constant.shape, size))
             slope[..., : norm.slope.shape[-1]] = norm.slope
             ties.append((maximum, replace(norm, slope=slope)))
-        shares = [Decision(f"share {k}", "", Interval(0.0, 1.0), 0.0, ()) for k in range(size - self.unbalances)]
+        shares = [Decision(f"share {k}", "", Interval(0.0, 1.0), 0.0, ()) for k in range(size - unbalances)]
         terms, limits = (
             tuple((number, self._through(norm, columns.matrix, points)) for number, norm in pairs)
             for pairs in (rows.terms, rows.limits)

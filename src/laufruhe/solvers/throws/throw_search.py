@@ -38,7 +38,6 @@ from laufruhe.solvers.throws.throw_windows import (
     has_same_unbalances,
     nearest_throws,
     place_in,
-    turns_freely,
     windows_of,
 )
 
@@ -296,15 +295,10 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         candidate, star_problem = self._first_crank(windows, left_out)
         throw_of_rotor, layout = rotor_throws_of(phasing, candidate), phasing.layout_of(candidate)
         riders = Riders(star_problem, throw_of_rotor, candidate.throws)
-        if any(phasing.is_geometry_open):
-            if not has_same_unbalances(phasing, candidate):
-                raise ModelError("unbalances on offset pins depend on the open bank or split pin angle")
-            # if the phase of the crank has no effect, its first throw keeps its angle
-            is_fixed = phasing.throw_bounds is not None or turns_freely(phasing, candidate, throw_of_rotor)
-            side = 0.0 if is_fixed else layout.side(0)
-            waves = ThrowWaves(riders.problem, layout, throw_of_rotor, phasing.is_geometry_open, side)
-        else:
-            waves = ThrowWaves(riders.problem, layout, throw_of_rotor)
+        if any(phasing.is_geometry_open) and not has_same_unbalances(phasing, candidate):
+            raise ModelError("unbalances on offset pins depend on the open bank or split pin angle")
+        side = layout.side(0) if any(phasing.is_geometry_open) and phasing.throw_bounds is None else 0.0
+        waves = ThrowWaves(riders.problem, layout, throw_of_rotor, phasing.is_geometry_open, side)
 
         def truncation(samples: int) -> float:
             return sum(term.weight * waves.left_out(term.measure, samples) for term in star_problem.objective)

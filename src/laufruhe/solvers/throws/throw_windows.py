@@ -20,7 +20,6 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Term
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.problem.sets import Sector
 from laufruhe.prove.witness import thin_box
 
 MAX_WINDOWS = 6_000
@@ -126,22 +125,6 @@ def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:
         for b, s in product((*ends[0][0], ends[0][1]), (*ends[1][0], ends[1][1]))
     ]
     return all(state == states[0] for state in states)
-
-
-def turns_freely(phasing: Phasing, candidate: Candidate, throw_of_rotor: dict[str, int]) -> bool:
-    """Return True if all unbalances off the throws have free angles, so that the crank's phase has no effect.
-
-    `throw_of_rotor` has the index of the throw of every rotor that turns with one.
-    """
-    problem = phasing.problem_of(replace(candidate, firing_order=None, without_gas=True))
-    free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in throw_of_rotor}
-    if any(rotor.unbalance for rotor in problem.engine.rotors if rotor.name in free):
-        return False
-    return all(
-        len(decision.rotor_drives) == 1 and isinstance(decision.set, Sector) and decision.set.free_angle
-        for decision in problem.unbalances
-        if any(drive.rotor in free for drive in decision.rotor_drives)
-    )
 
 
 def nearest_throws(window: FiringWindow, throws: Array | None = None) -> Array:
