@@ -25,14 +25,6 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
 
-def slot_space(cylinders: int, places: tuple[float, ...]) -> StarSpace:
-    """Return all firing orders of n cylinders as a space of crank stars whose steps are the n slots of a cycle.
-
-    Each slot has one cylinder, and cylinder 1 has slot 0. `places` are the positions of the throws along the crank [m].
-    """
-    return StarSpace(cylinders, ((1,) * cylinders,), places)
-
-
 class FiringModel(StarModel):
     """Loads of all firing orders: a crank star model whose steps are the slots of the cycle.
 

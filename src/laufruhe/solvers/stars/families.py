@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.firing_model import FiringModel, slot_space
+from laufruhe.load_models.firing_model import FiringModel
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.machine.firing import even_patterns, firing_lattice, order_slots, star_steps
 from laufruhe.machine.layouts import Layout, even_throws
@@ -97,7 +97,8 @@ def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family
         space = StarSpace(lattice.steps, patterns, layout.throw_positions)
         family = Family(geometry, layout, space, fixed)
         if by_firing:
-            slots = slot_space(phasing.cylinders, layout.throw_positions)
+            # cylinder 1 has slot 0
+            slots = StarSpace(phasing.cylinders, ((1,) * phasing.cylinders,), layout.throw_positions)
             family = replace(family, space=slots, fixed=order and order_slots(order), is_of_orders=True)
         families.append(family)
     return tuple(families), reason

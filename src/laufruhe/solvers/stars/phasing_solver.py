@@ -15,6 +15,7 @@ from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.machine.firing import MAX_ORDERS
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import report_progress
+from laufruhe.problem.evaluation import with_more_samples
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
@@ -113,10 +114,7 @@ def _with_more_samples(problem: Problem, families: Sequence[Family], result: Res
         if gap <= problem.tolerance or result.status is Status.OPTIMAL or is_time_over():
             break
         # the error of sample averages is proportional to the square of the step
-        factor = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MAX_TIMES)
-        fidelity = problem.fidelity
-        # keep the steps of the gas, so that designs keep their objectives
-        problem = problem.at(replace(fidelity, samples=factor * fidelity.samples, gas_samples=fidelity.gas_steps))
+        problem = with_more_samples(problem, min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MAX_TIMES))
         assert problem.phasing is not None
         search_result = search(_with_half_tolerance(problem), problem.phasing, families)
         candidate = _best_of(problem, problem.phasing, search_result) if search_result.designs else result

@@ -71,10 +71,9 @@ def solve_design(
     # a lower bound of sample averages is a lower bound of the means (P7)
     fine, relaxed = model.at(full), model.at(full, averaged=True)
     fine_rows, averaged = (_with_shafts(rows.at(star), owners, built) for rows in (fine, relaxed))
-    fixed = [not norm.slope.any() for _, norm in fine_rows.limits]
-    if _violates_fixed_limit(model, star, fine_rows, fixed):
-        return None, None
     if not fine_rows.size:
+        if _violates_limit(model, star, fine_rows):
+            return None, None
         # without decisions, the rows of the star prove its value
         star_rows = relaxed.at(star)
         zero = np.zeros(star_rows.size)
@@ -84,23 +83,23 @@ def solve_design(
         return SolvedStar(star, built, value, star_rows.objective(zero)), cut_of(relaxed, Multipliers(terms, limits))
     best: tuple[SolvedStar, Bound, Array] | None = None
     for samples in _sample_counts(full):
-        solution = solve_cones(_without_fixed_limits(_with_shafts(model.at(samples).at(star), owners, built), fixed))
+        solution = solve_cones(_with_shafts(model.at(samples).at(star), owners, built))
         if solution.x is None:
             # at few samples, a mean may exceed its value over the cycle; sample averages never do (P7)
             averages = model.at(samples, averaged=True)
             loose_problem = replace(
                 averages, limits=tuple((maximum * (1.0 + FEASIBILITY_TOL), norm) for maximum, norm in averages.limits)
             )
-            cut = _limit_cut(loose_problem, solution.multipliers, fixed)
+            cut = _limit_cut(loose_problem, solution.multipliers)
             if cut.excludes(np.array([star]), [built], owners).all():
                 return None, cut
-            solution = solve_cones(_without_fixed_limits(_with_shafts(loose_problem.at(star), owners, built), fixed))
+            solution = solve_cones(_with_shafts(loose_problem.at(star), owners, built))
             if solution.x is None:
-                return None, _limit_cut(loose_problem, solution.multipliers, fixed)
+                return None, _limit_cut(loose_problem, solution.multipliers)
             if samples < full:
                 continue
-        bound = best_bound(_without_fixed_limits(averaged, fixed), solution.x, solution.multipliers)
-        violation = _without_fixed_limits(fine_rows, fixed).violation(solution.x)
+        bound = best_bound(averaged, solution.x, solution.multipliers)
+        violation = fine_rows.violation(solution.x)
         best = (SolvedStar(star, built, fine_rows.objective(solution.x), bound.value), bound, solution.x)
         # more samples cannot close the gap between averages and means; without a proof, few samples suffice
         is_close = gap_of(averaged.objective(solution.x), bound.value, zero_level) <= 0.25 * tolerance or not proves
@@ -109,9 +108,9 @@ def solve_design(
     if best is None:
         return None, None
     design, bound, x = best
-    cut = cut_of(relaxed, _with_fixed_multipliers(bound.multipliers, relaxed, fixed))
+    cut = cut_of(relaxed, bound.multipliers)
     cut_bound = float(cut.bounds(np.array([star]), [built], owners)[0, 0])
-    check_dual("cuts of stars, at their own star", cut_bound, _without_fixed_limits(averaged, fixed), x, bound)
+    check_dual("cuts of stars, at their own star", cut_bound, averaged, x, bound)
     return design, cut
 
 
@@ -124,40 +123,22 @@ def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]
     return math.inf if x is None else affine.objective(x)
 
 
-def _violates_fixed_limit(model: StarModel, star: Sequence[int], affine: AffineProblem, fixed: Sequence[bool]) -> bool:
-    # limits that no decision changes; check their means again at more samples
+def _violates_limit(model: StarModel, star: Sequence[int], affine: AffineProblem) -> bool:
+    # without decisions; means that violate limits are computed again at more samples
     def violates(limit: tuple[float, AffineNorm], tolerance: float) -> bool:
         maximum, norm = limit
         return norm.value(np.zeros(norm.slope.shape[-1])) > maximum * (1.0 + tolerance)
 
-    violated = [k for k, limit in enumerate(affine.limits) if fixed[k] and violates(limit, FEASIBLE)]
+    violated = [k for k, limit in enumerate(affine.limits) if violates(limit, FEASIBLE)]
     if not violated:
         return False
     finer = model.at(FINER * model.samples, averaged=True).at(star).limits
     return any(violates(finer[k], FEASIBILITY_TOL) for k in violated)
 
 
-def _limit_cut(problem: StarProblem, multipliers: Multipliers, fixed: Sequence[bool]) -> Cut:
+def _limit_cut(problem: StarProblem, multipliers: Multipliers) -> Cut:
     # multipliers of the limits may prove that stars violate them (S45)
-    zero = tuple(np.zeros_like(norm.constant) for _, norm in problem.terms)
-    return cut_of(problem, Multipliers(zero, _with_fixed_multipliers(multipliers, problem, fixed).limits))
-
-
-def _without_fixed_limits(affine: AffineProblem, fixed: Sequence[bool]) -> AffineProblem:
-    if not any(fixed):
-        return affine
-    return replace(
-        affine, limits=tuple(limit for limit, is_fixed in zip(affine.limits, fixed, strict=True) if not is_fixed)
-    )
-
-
-def _with_fixed_multipliers(multipliers: Multipliers, problem: StarProblem, fixed: Sequence[bool]) -> Multipliers:
-    rows = iter(multipliers.limits)
-    limits = tuple(
-        np.zeros_like(norm.constant) if is_fixed else next(rows)
-        for (_, norm), is_fixed in zip(problem.limits, fixed, strict=True)
-    )
-    return replace(multipliers, limits=limits)
+    return cut_of(problem, replace(multipliers, terms=tuple(np.zeros_like(norm.constant) for _, norm in problem.terms)))
 
 
 def _sample_counts(full: int) -> list[int]:
