@@ -26,8 +26,6 @@ SlotAssignment: TypeAlias = tuple[tuple[int, Shape], ...]
 _MAX_ASSIGNMENTS = 500
 _MAX_BROKEN = 40
 _MAX_LOOKED_AT = 20_000
-# shares of the unevenness allowed, tried one after the other
-_SHARES = (0.25, 0.5, 0.75, 1.0)
 _SLACK = 1e-9
 # weight of the violation of bounds over that of unevenness
 _BROKEN = 1e3
@@ -91,38 +89,24 @@ class FiringSlots:
         If no pattern keeps the bounds, those with the least violation are returned. If the firing order is given,
         `throw_slots` has the slots of the cylinders of every throw.
         """
-        even, slack, complete = self.cycle.angle / self.count, 0.0, True
+        even, slack, maximum = self.cycle.angle / self.count, 0.0, min(_MAX_ASSIGNMENTS, 300_000 // self.count**2)
 
         def unevenness(pattern: FiringPattern) -> float:
             return round(max(abs(interval - even) for interval in pattern.intervals(self.cycle)), 9)
 
         while True:
-            assignments, all_of = self._first_assignments(slack, throw_slots)
-            complete = complete and (slack > 0.0 or all_of)
-            patterns = [pattern for assignment in assignments if (pattern := self._timed(assignment)) is not None]
+            # roughly the most even assignments come first
+            nodes = itertools.count(1)
+            widened = replace(self, minimum=self.minimum - slack, maximum=self.maximum + slack)
+            assignments = [*itertools.islice(widened._assignments(throw_slots, nodes), maximum + 1)]
+            if slack == 0.0:
+                complete = len(assignments) <= maximum and next(nodes) <= _MAX_LOOKED_AT
+            patterns = [pattern for x in assignments[:maximum] if (pattern := self._timed(x)) is not None]
             patterns.sort(key=lambda pattern: (round(pattern.broken, 9), unevenness(pattern)))
             minimum = patterns[0].broken if patterns else math.inf
             if minimum <= max(slack, 1e-7) or slack > self.cycle.angle:
-                least_broken = [pattern for pattern in patterns if pattern.broken <= minimum + 1e-7]
-                return least_broken, complete
-            slack = max(0.05 * even, 1.3 * slack)
-
-    def _first_assignments(
-        self, slack: float, throw_slots: Sequence[Sequence[int]] | None
-    ) -> tuple[list[SlotAssignment], bool]:
-        """Return assignments of firings to throws, roughly the most even first, and True if these are all."""
-        even, assignments = self.cycle.angle / self.count, dict[SlotAssignment, None]()
-        maximum = min(_MAX_ASSIGNMENTS, 300_000 // self.count**2) if slack == 0.0 else _MAX_BROKEN
-        complete = False
-        for share in _SHARES:
-            low, high = self.minimum - slack, self.maximum + slack
-            narrowed = replace(self, minimum=even - share * (even - low), maximum=even + share * (high - even))
-            nodes = itertools.count(1)
-            assignments |= dict.fromkeys(itertools.islice(narrowed._assignments(throw_slots, nodes), maximum + 1))
-            if len(assignments) > maximum or next(nodes) > _MAX_LOOKED_AT:
-                return list(assignments)[:maximum], False
-            complete = share == 1.0
-        return list(assignments), complete
+                return [pattern for pattern in patterns if pattern.broken <= minimum + 1e-7], complete
+            slack, maximum = max(0.05 * even, 1.3 * slack), _MAX_BROKEN
 
     def _shapes(self) -> list[Shape]:
         """Return the shapes of a throw: slot offset, whole turns and angle share of its further cylinders."""
