@@ -11,14 +11,14 @@ so millions of stars are compared without a load being computed.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import ComplexArray, Mask
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import phasors
 
 Stars = NDArray[np.uint8]
@@ -138,7 +138,6 @@ class StarSpace:
 
     def blocks(self) -> Iterator[Stars]:
         """Yield all crank stars, one of each set of equivalent images, in blocks of shape (n, throws)."""
-        order = outside_in(self.throws)
         for pattern in self.patterns:
             left = np.array([pattern], dtype=np.uint8)
             left[0, 0] -= 1
@@ -154,36 +153,8 @@ class StarSpace:
                     continue
                 rows, steps = np.nonzero(counts)
                 stars, counts = stars[rows], counts[rows]
-                stars[:, order[placed]] = steps
+                stars[:, placed] = steps
                 counts[np.arange(len(rows)), steps] -= 1
-                first_images = self._first_of_images(stars, set(order[: placed + 1]))
-                stars, counts = stars[first_images], counts[first_images]
                 for start in range(0, len(stars), BLOCK):
                     part = slice(start, start + BLOCK)
                     waiting.append((stars[part], counts[part], placed + 1))
-
-    def _first_of_images(self, stars: Stars, placed: Set[int]) -> Mask:
-        """Return a mask of stars of which no image is already known to come earlier (S2).
-
-        Image and star compare throw by throw from the front, as far as the steps that both need are placed.
-        """
-        keep, last = np.ones(len(stars), dtype=bool), self.throws - 1
-        steps = stars.astype(np.int16)
-        for swap, turn in ((False, True), (True, False), (True, True)):
-            if (swap and not self.mirror) or (turn and not self.reflect):
-                continue
-            undecided = np.ones(len(steps), dtype=bool)
-            for k in range(1, self.throws):
-                source = last - k if swap else k
-                if not {k, source} <= placed or (swap and last not in placed):
-                    break
-                image = steps[:, source] - (steps[:, last] if swap else 0)
-                image = (-image if turn else image) % self.phases
-                keep &= ~(undecided & (image < steps[:, k]))
-                undecided &= image == steps[:, k]
-        return keep
-
-
-def outside_in(throws: int) -> tuple[int, ...]:
-    """Return the order first, last, second, ... of throws: it distinguishes images early."""
-    return tuple(k // 2 if k % 2 == 0 else throws - 1 - k // 2 for k in range(throws))
