@@ -3,8 +3,7 @@
 Even crank stars of one pattern have the same forces. So the signals V and V' of two of them differ by what their
 couples C_h and C'_h of order h load: V = V' + Re sum_h g_h (C_h - C'_h) e^{i h phi}, with g_h from two stars whose
 loads the exact model gives. Averages of V over shifts by s are no more, in a norm that no shift changes. With the
-weights 2 cos(h s), of mean size 4 / pi, one order V_h is left. With 1 + cos(h s - psi) over firing intervals all that
-no couple changes is left, and half of that order at any phase.
+weights 2 cos(h s), of mean size 4 / pi, one order V_h is left.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -32,12 +31,10 @@ from laufruhe.problem.problem import Problem
 
 ONE_ORDER = 4.0 / math.pi
 """Largest ratio of the norm of one order of a signal to that of the signal."""
-# phases of a couple that are tried, and halvings of the bound of a couple
-PHASES, HALVINGS = 16, 24
+# number of phases of a couple at which linear bounds touch the objective
+PHASES = 8
 SMALL, SHORT = 0.01, 0.1
 """Share of the constant part, and lever [m], of the couples at which linear bounds touch the objective."""
-ALIASES = 1.1
-"""Safety factor of orders that shifts by firing intervals do not separate from the order of the window."""
 # relative differences of loads that count as none: between stars, and of the loads of one order
 _SAME, _NEGLIGIBLE = 1e-9, 1e-13
 # most numbers of rows that are computed at once
@@ -141,7 +138,7 @@ class CoupleNorms:
         Each bound touches the objective at small couples of the two strongest orders, with one pair of their phases.
         """
         shares = np.asarray(sum(term.shares for term in self.terms))
-        turns = np.exp(1j * np.arange(PHASES // 2) * math.tau / (PHASES // 2))
+        turns = np.exp(1j * np.arange(PHASES) * math.tau / PHASES)
         strongest_orders = np.argsort(-shares, kind="stable")[:2]
         touching_points = np.zeros((len(turns) ** len(strongest_orders), len(self.orders)), dtype=complex)
         for row, chosen in zip(touching_points, itertools.product(turns, repeat=len(strongest_orders)), strict=True):
@@ -174,35 +171,7 @@ class CoupleNorms:
         # squares of orders add up, so that what no couple changes leaves less room
         room = math.sqrt(value - minimum) * math.sqrt(value + minimum) if is_euclidean else value
         places = np.flatnonzero(shares > 0.0)
-        window = Window.narrowest(space.phases, {self.orders[k]: room / float(shares[k]) for k in places})
-        if is_euclidean or value == math.inf or not len(places):
-            return window
-        pairs = zip(window.orders, window.reaches, strict=True)
-        return replace(window, reaches=tuple(self._reach(space, self.orders.index(h), value, c) for h, c in pairs))
-
-    def _reach(self, space: StarSpace, place: int, value: float, maximum: float) -> float:
-        """Return an upper bound of the couple of any crank star with an objective up to `value` (S48).
-
-        The couple is that of the order with index `place`. Half of it must not exceed the value at any phase.
-        `maximum` is a known bound of the couple.
-        """
-        order, levers = self.orders[place], float(np.abs(space.places).sum())
-        aliased = [
-            k for k, other_order in enumerate(self.orders)
-            if k != place and ((other_order - order) % space.phases == 0 or (other_order + order) % space.phases == 0)
-        ]  # fmt: skip
-        room = value + 0.5 * ALIASES * levers * sum(
-            term.weight * float(term.unit_norms[aliased].sum()) for term in self.terms
-        )
-        turns = np.exp(1j * np.arange(PHASES) * math.tau / PHASES)
-        parts = np.zeros((PHASES, 2 * len(self.orders)))
-        parts[:, 2 * place], parts[:, 2 * place + 1] = turns.real, turns.imag
-        low = 0.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + maximum)
-            values = sum(term.values(0.5 * middle * parts) for term in self.terms)
-            low, maximum = (low, middle) if float(np.max(values)) > room else (middle, maximum)
-        return maximum
+        return Window.narrowest(space.phases, {self.orders[k]: room / float(shares[k]) for k in places})
 
 
 def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:

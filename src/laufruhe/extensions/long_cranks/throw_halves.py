@@ -134,7 +134,6 @@ def meeting(space: StarSpace, free: Free, share: Counts, window: Window) -> Iter
         return
     front.grow(room + back.support)
     back.grow(room + front.support)
-    front.prune(room + back.support)
     if not len(front.sets) or not len(back.sets):
         return
     grid = _Grid(np.concatenate([sums for _, sums in front.leaves()], axis=1), reaches)
@@ -182,7 +181,6 @@ class _Half:
         self._last_sums = np.einsum("k,nlkd->ndl", self._levers[count - leaves :], self._waves[self._last_items])
         self._index = np.zeros(1 << count, dtype=np.intp)
         self._index[names] = np.arange(len(names))
-        self.prune(room)
 
     def _grown(self, part: slice, size: int, room: Array) -> tuple[Indices, Indices, Array]:
         # arrangements of one more throw, which leave `size` items
@@ -200,17 +198,6 @@ class _Half:
         supports = np.zeros((1 << len(self.throws), len(self._sides)))
         supports[names] = (np.sort(self._sides[:, subsets]) @ levers).T
         return np.asarray(sums @ _directions(sums.shape[1]).T + supports[sets])
-
-    def prune(self, room: Array) -> None:
-        """Leave out arrangements whose couple the other half, with `room`, cannot cancel; lower the support (S49)."""
-        keep, self.support = np.zeros(len(self.sets), dtype=bool), np.full(len(room), -math.inf)
-        size = len(self.throws) - self.items.shape[1]
-        for start in range(0, len(self.sets), _NODES):
-            part = slice(start, start + _NODES)
-            reaches = self._reaches(self.sets[part], self.sums[part], size)
-            keep[part] = (reaches + room >= 0.0).all(axis=1)
-            self.support = np.maximum(self.support, reaches[keep[part]].max(axis=0, initial=-math.inf))
-        self.items, self.sets, self.sums = self.items[keep], self.sets[keep], self.sums[keep]
 
     def leaves(self) -> Iterator[tuple[int, Array]]:
         """Yield the index of the first arrangement of a block, and couples of its arrangements, shape (2 orders, n)."""
