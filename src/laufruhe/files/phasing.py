@@ -29,7 +29,7 @@ from laufruhe.machine.firing import (
 )
 from laufruhe.machine.layouts import LAYOUTS, Layout, even_throws
 from laufruhe.problem.decision import without_rotors
-from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, Method, OrderCriterion, ShaftChoice, bounded_stars
+from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, ShaftChoice, bounded_stars
 from laufruhe.problem.problem import Phasing, Problem
 
 Assemble = Callable[[EngineTable, bool], Problem]
@@ -133,7 +133,7 @@ def open_phasing(
         best=table.best,
         criteria=tuple(OrderCriterion(name) for name in table.rank_orders_by),
         time_limit=table.time_limit,
-        method=Method(table.method),
+        lists_all=table.method == "enumeration",
     )
     _check(phasing, engine)
     try:

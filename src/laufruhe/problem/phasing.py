@@ -24,14 +24,6 @@ _MAX_PERMUTED = 7
 _EVEN_STARS = 3
 
 
-class Method(StrEnum):
-    """Method that decides crank star, firing order and optional shafts."""
-
-    AUTO = "auto"
-    SEARCH = "search"
-    ENUMERATION = "enumeration"
-
-
 class OrderCriterion(StrEnum):
     """Criterion that ranks firing orders of one crank star."""
 
@@ -168,6 +160,8 @@ class PhasingOf(Generic[P]):
         Criteria that rank firing orders, the most important first.
     time_limit
         Time limit of the search [s].
+    lists_all
+        True if a search evaluates every crank star, so that the ranking is proven throughout.
     thorough
         True if throws are also searched by boxes, and with less unevenness than allowed to show its worth.
     problem_of
@@ -189,7 +183,7 @@ class PhasingOf(Generic[P]):
     best: int = 10
     criteria: tuple[OrderCriterion, ...] = (OrderCriterion.NEIGHBOURS, OrderCriterion.LONGEST_GAP)
     time_limit: float = 600.0
-    method: Method = Method.AUTO
+    lists_all: bool = False
     thorough: bool = True
 
     def layout_of(self, candidate: Candidate) -> Layout:

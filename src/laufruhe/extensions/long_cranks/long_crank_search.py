@@ -18,7 +18,6 @@ from laufruhe.problem.channels import ROCKING_COUPLE
 from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
-from laufruhe.problem.phasing import Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
 from laufruhe.prove.throws.firing_average import firing_bound
@@ -61,7 +60,7 @@ def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     answers = []
     for family, objective in simple:
         space = replace(family.space, mirror=True, reflect=True)
-        if phasing.method is Method.ENUMERATION:
+        if phasing.lists_all:
             stars = enumerate_stars(space, objective, phasing.best, phasing.time_limit)
             method = "stars evaluated one by one"
         else:

@@ -25,7 +25,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, with_default_sampling
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
-from laufruhe.problem.phasing import Candidate, Method
+from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
@@ -105,7 +105,7 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
             f"open throws have over {MAX_LISTED} crank stars, too many with open mounts; fix the firing order"
         )
     on_initial = replace(phasing, problem_of=lambda candidate: _on_initial_mounts(phasing.problem_of(candidate)))
-    lists_all = phasing.method is Method.ENUMERATION
+    lists_all = phasing.lists_all
     scored: list[tuple[float, Star]] = []
     designs = 0
     for family in families:

@@ -13,7 +13,7 @@ from laufruhe.extension import missing_extension
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.problem.numerical_zero import numerical_zero
-from laufruhe.problem.phasing import Candidate, Method
+from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
 from laufruhe.solvers.stars.cut_search import search_designs
@@ -173,7 +173,7 @@ def enumeration_result(phasing: Phasing, family: Family, search: StarSearchResul
 
 def _search_by_cuts(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
     zero_level = numerical_zero(problem)
-    count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
+    count = 10**9 if phasing.lists_all else phasing.best
     results = []
     for family in families:
         model = family.model(phasing)
