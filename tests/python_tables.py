@@ -1,7 +1,7 @@
 """The Python functions for tables of problem files, made of the schema: `python tests/schemas.py` writes them.
 
 A function for each table inside a table, a method for each table of an engine or of a problem, and a function for each
-layout. Every key of the file is an argument; what the schema says of the key is in the docstring.
+layout. Every key of the file is an argument; `keys_from` adds to the docstring what the schema says of the key.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import laufruhe
-from laufruhe import units
 from laufruhe.files.engine import EngineTable
 from laufruhe.machine.drives import DRIVES
 from laufruhe.machine.layouts import LAYOUTS
-from schemas import alternatives, problem_schema
+from laufruhe.python.keys import NAMES, alternatives, description
+from schemas import problem_schema
 
 PACKAGE = Path(laufruhe.__file__).parent
 PARTS, TABLES, LAYOUT_CALLS, GOALS = (
@@ -30,10 +30,8 @@ TEXTS = ("title", "source", "assumptions", "tolerance")
 WITHIN = "Share by which the objective before this one may exceed its least value."
 GOAL_KEYS = ("objective", "constraints")
 WIDTH = 120
-UNITS = {units.dimension_name(unit): unit for unit in units._EXAMPLES}
 MADE = "`python tests/schemas.py` makes this file of the models of problem files."
-# what a name that Python does not allow is called
-NAMES = {"as": "how"}
+ARGUMENTS = {key: name for name, key in NAMES.items()}
 CHOICES = 40
 
 Entry = Mapping[str, Any]
@@ -49,7 +47,7 @@ def quoted(value: Any) -> str:
 
 
 def argument(key: str) -> str:
-    name = NAMES.get(key, key)
+    name = ARGUMENTS.get(key, key)
     assert not keyword.iskeyword(name), key
     return name
 
@@ -90,22 +88,6 @@ def type_of(entry: Entry, key: str = "", table: Entry | None = None) -> str:
     return " | ".join(found).replace("Number | Open", "Value")
 
 
-def unit_of(entry: Entry) -> str:
-    """SI unit of a key in brackets; empty for plain numbers and other values."""
-    for one in alternatives(schema(), entry):
-        while one.get("type") == "array":
-            one = next(alternatives(schema(), one["items"]))
-        if "x-dimension" in one:
-            return f" [{UNITS[one['x-dimension']]}]"
-    return ""
-
-
-def described(entry: Entry) -> str:
-    words = str(entry.get("description", "")).replace("\\", "\\\\")
-    unit = unit_of(entry)
-    return f"{words.removesuffix('.')}{unit}." if unit and unit not in words else words
-
-
 def wrapped(text: str, indent: str) -> str:
     return textwrap.fill(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_long_words=False)
 
@@ -129,10 +111,10 @@ class Call:
 
     def __init__(
         self, name: str, summary: str, table: Entry, returns: str, body: str, *, first: str = "", method: bool = False,
-        fixed: Mapping[str, Any] | None = None, required: frozenset[str] = frozenset(), first_optional: bool = False,
+        fixed: Mapping[str, Any] | None = None, required: frozenset[str] = frozenset(), title: str = "",
     ) -> None:  # fmt: skip
         self.name, self.summary, self.returns, self.body, self.method = name, summary, returns, body, method
-        self.first, self.table, self.first_optional = first, table, first_optional
+        self.first, self.table, self.title = first, table, title
         self.keys = {key: entry for key, entry in table["properties"].items() if key not in (fixed or {})}
         self.required = required or frozenset(table.get("required", ()))
 
@@ -142,26 +124,28 @@ class Call:
         others = [key for key in self.keys if key not in self.required and key != self.first]
         signature = ["self"] if self.method else []
         if self.first:
-            plain = self.annotated(self.first, self.first in self.required and not self.first_optional)
+            plain = self.annotated(self.first, self.first in self.required)
             signature += [plain]
         if needed or others:
             signature.append("*")
         signature += [self.annotated(key, True) for key in needed] + [self.annotated(key, False) for key in others]
-        lines = packed(signature, f"{indent}    ")
-        documented = []
-        for key in ([self.first] if self.first else []) + needed + others:
-            documented.append(f"{indent}    {argument(key)}")
-            documented.append(wrapped(described(self.keys[key]) or "No description.", f"{indent}        "))
-        summary, _, more = self.summary.partition(". ")
-        doc = f'{indent}    """{summary.removesuffix(".")}.' + (f"\n\n{wrapped(more, indent + '    ')}" if more else "")
-        if documented:
-            rule = f"{indent}    Parameters\n{indent}    ----------\n"
-            doc += f"\n\n{rule}" + "\n".join(documented) + f'\n{indent}    """'
-        else:
-            doc += f'\n{indent}    """' if more else '"""'
-        return (
-            f"{indent}def {self.name}(\n{lines}\n{indent}) -> {self.returns}:\n{doc}\n{indent}    return {self.body}\n"
-        )
+        arguments = ", ".join(signature)
+        head = f"{indent}def {self.name}({arguments}) -> {self.returns}:"
+        if len(head) > WIDTH:
+            head = f"{indent}def {self.name}(\n{packed(signature, f'{indent}    ')}\n{indent}) -> {self.returns}:"
+        if self.title:
+            head = f'{indent}@keys_from("{self.title}")\n{head}'
+        doc = f'{indent}    """{self.summary}'
+        if not self.title:
+            doc += f"\n\n{indent}    Parameters\n{indent}    ----------"
+            for key in ([self.first] if self.first else []) + needed + others:
+                words = description(schema(), self.keys[key]).replace("\\", "\\\\")
+                doc += f"\n{indent}    {argument(key)}\n" + wrapped(words, f"{indent}        ")
+            doc += f"\n{indent}    "
+        elif len(doc) + 3 > WIDTH:
+            summary, _, more = self.summary.partition(". ")
+            doc = f'{indent}    """{summary}.\n\n' + wrapped(more, indent + "    ") + f"\n{indent}    "
+        return f'{head}\n{doc}"""\n{indent}    return {self.body}\n'
 
     def annotated(self, key: str, required: bool) -> str:
         kind = type_of(self.keys[key], key, self.table)
@@ -219,7 +203,7 @@ OWN = ("Array", "Number", "Open", "Table", "Value", "Values")
 
 
 def module(doc: str, body: str, extra: Mapping[str, tuple[str, ...]]) -> str:
-    gap = "\n" if body.startswith(("def", "class")) else ""
+    gap = "\n" if body.startswith(("@", "def", "class")) else ""
     head = imports(body, STANDARD)
     own = imports(body, {**extra, "laufruhe.problem.number_types": OWN})
     own = "\n".join(sorted(own.split("\n")))
@@ -241,9 +225,11 @@ def tables_module() -> str:
         name, fixed = snake(table["title"]), fixed_of(table)
         summary = f"Return a table `{name}`. {table.get('description', '')}".rstrip()
         given = f"keys_of(locals(), {fixed})" if fixed else "keys_of(locals())"
-        calls.append(Call(name, summary, table, "Table", given, first=first_of(table), fixed=fixed).text())
+        calls.append(
+            Call(name, summary, table, "Table", given, first=first_of(table), fixed=fixed, title=table["title"]).text()
+        )
     body = "\n\n".join(calls)
-    extra = {"laufruhe.python.keys": ("keys_of",), "laufruhe.problem.goals": ("QuantityName",)}
+    extra = {"laufruhe.python.keys": ("keys_from", "keys_of"), "laufruhe.problem.goals": ("QuantityName",)}
     return module("Tables inside the tables of a problem file, such as an unbalance of a shaft.", body, extra)
 
 
@@ -259,13 +245,23 @@ def parts_module() -> str:
             summary = f"Return the engine with {article(words) if is_list else words}. {entry.get('description', '')}"
             given = f"keys_of(locals(), {fixed})" if fixed else "keys_of(locals())"
             body = f'self._with("{key}", "{name}", {given})'
-            call = Call(name, summary.rstrip(), table, "Self", body, first=first_of(table), method=True, fixed=fixed)
+            call = Call(
+                name,
+                summary.rstrip(),
+                table,
+                "Self",
+                body,
+                first=first_of(table),
+                method=True,
+                fixed=fixed,
+                title=table["title"],
+            )
             calls.append(call.text())
     head = (
         'class EngineParts(Parts):\n    """Methods that add a table of a problem file to an engine; each returns a new '
         'engine."""\n\n'
     )
-    extra = {"laufruhe.python.keys": ("Parts", "keys_of")}
+    extra = {"laufruhe.python.keys": ("Parts", "keys_from", "keys_of")}
     return module("Parts and settings of an engine in code.", head + "\n".join(calls), extra)
 
 
@@ -325,16 +321,16 @@ def layouts_module() -> str:
         summary, given = f"Return an engine of layout {name}. {doc}.", f'engine_of(locals(), {{"layout": "{name}"}})'
         call = Call(
             name.replace("-", "_"), summary, {"properties": keys}, "EngineDraft", given, first="cylinders",
-            required=required,
+            required=required, title="EngineTable",
         )  # fmt: skip
         calls.append(call.text())
     summary, keys = "Return an engine of the catalogue; arguments replace its numbers.", dict(engine["properties"])
     call = Call(
         "engine", summary, {"properties": keys}, "EngineDraft", "engine_of(locals(), {})", first="catalogue",
-        required=frozenset({"catalogue"}),
+        required=frozenset({"catalogue"}), title="EngineTable",
     )  # fmt: skip
     calls.append(call.text())
-    extra = {"laufruhe.python.draft": ("EngineDraft", "engine_of")}
+    extra = {"laufruhe.python.draft": ("EngineDraft", "engine_of"), "laufruhe.python.keys": ("keys_from",)}
     return module("Engines in code: a function for each layout, and one for the catalogue.", "\n\n".join(calls), extra)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from laufruhe.files.catalogue import KEY, engines
 from laufruhe.files.fields import ANYWHERE, without_open
 from laufruhe.files.problem_file import file_model
 from laufruhe.machine.layouts import LAYOUTS
+from laufruhe.python.keys import alternatives
 from laufruhe.studies.reader import StudyFile
 
 WORDS = Path(__file__).with_name("hover.toml")
@@ -72,18 +73,6 @@ def _words(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str) -> st
     told, of_table = _told()["words"], _of_table(schema, entry)
     own = "" if of_table == ANYWHERE else of_table
     return str(told.get(path) or own or told.get(path.rpartition(".")[2], ""))
-
-
-def alternatives(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """What may stand for a key, but null."""
-    place = entry.get("$ref")
-    found = schema["definitions"][place.rpartition("/")[2]] if place else entry
-    # conditions on a table are no alternatives to it
-    choices = None if "properties" in found else found.get("anyOf") or found.get("oneOf")
-    if choices is None:
-        yield from [found] if found.get("type") != "null" else []
-    for one in choices or ():
-        yield from alternatives(schema, one)
 
 
 def kind(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:

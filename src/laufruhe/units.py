@@ -184,6 +184,11 @@ def dimension_name(unit: str) -> str:
     return _EXAMPLES.get(unit, (f"the dimension of {unit}", ""))[0]
 
 
+def unit_of_dimension(name: str) -> str:
+    """Return the SI unit of a dimension by its name with article."""
+    return next(unit for unit, (dimension, _) in _EXAMPLES.items() if dimension == name)
+
+
 def example(unit: str) -> str:
     """Return an example of a value in the dimension of an SI unit: "120 mm"."""
     return _EXAMPLES.get(unit, ("", f"1 {unit}"))[1]

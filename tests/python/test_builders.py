@@ -195,6 +195,16 @@ def test_every_layout_has_its_function_in_the_package() -> None:
     assert all(getattr(laufruhe, name) is getattr(layouts, name) for name in names)
 
 
+def test_help_describes_every_argument() -> None:
+    calls = [tables.body, laufruhe.vee, laufruhe.EngineDraft.gas_wiebe, laufruhe.EngineDraft.mounts]
+    for call in calls:
+        lines = (inspect.getdoc(call) or "").splitlines()
+        assert set(inspect.signature(call).parameters) - {"self"} <= set(lines)
+    assert "    Travel of the piston; with an offset a little more than twice the crank radius [m]." in (
+        inspect.getdoc(laufruhe.vee) or ""
+    )
+
+
 def single(**keys: Any) -> laufruhe.EngineDraft:
     return laufruhe.inline(1, cycle="four-stroke", stroke=0.09, rod_ratio=0.3, reciprocating_mass=0.5, **keys)
 

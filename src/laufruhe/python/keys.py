@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
+import json
+import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, Self
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any, Self, TypeVar
+
+from laufruhe.files.problem_file import SCHEMA
+from laufruhe.units import unit_of_dimension
+
+Call = TypeVar("Call", bound=Callable[..., Any])
 
 NAMES = {"how": "as"}
 """Keys that are no names in Python, by the names of their arguments."""
@@ -21,3 +31,48 @@ class Parts(ABC):
 
     @abstractmethod
     def _with(self, key: str, name: str, table: Mapping[str, Any]) -> Self: ...
+
+
+def alternatives(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """Yield the JSON schemas that a value of a key may follow, without that of null."""
+    reference = entry.get("$ref")
+    resolved = schema["definitions"][reference.rpartition("/")[2]] if reference else entry
+    # conditions on a table are no alternatives to it
+    choices = None if "properties" in resolved else resolved.get("anyOf") or resolved.get("oneOf")
+    if choices is None:
+        yield from [resolved] if resolved.get("type") != "null" else []
+    for one in choices or ():
+        yield from alternatives(schema, one)
+
+
+def description(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
+    """Return the description of a key with its SI unit in brackets."""
+    words = entry.get("description", "No description.")
+    for one in alternatives(schema, entry):
+        while one.get("type") == "array":
+            one = next(alternatives(schema, one["items"]))
+        if "x-dimension" in one:
+            unit = f" [{unit_of_dimension(one['x-dimension'])}]"
+            return words if unit in words else f"{words.removesuffix('.')}{unit}."
+    return str(words)
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return dict(json.loads((files("laufruhe.files") / SCHEMA).read_text(encoding="utf-8")))
+
+
+def keys_from(title: str) -> Callable[[Call], Call]:
+    """Add the keys of a table of the schema to the docstring of a function that has them as arguments."""
+
+    def add_parameters(call: Call) -> Call:
+        entries = _schema()["definitions"][title]["properties"]
+        lines = ["Parameters", "----------"]
+        for name in inspect.signature(call).parameters:
+            if name != "self":
+                words = description(_schema(), entries[NAMES.get(name, name)])
+                lines += [name, textwrap.indent(textwrap.fill(words, 112), "    ")]
+        call.__doc__ = "\n".join([inspect.cleandoc(call.__doc__ or ""), "", *lines])
+        return call
+
+    return add_parameters
