@@ -39,14 +39,15 @@ TASKS = 1000
 SMALL = {"draws": 4000, "chunk": 500, "scenes": 40, "few": 2, "points": 3}
 SHARED = {"draws": 100_000, "chunk": 10_000, "scenes": 160, "few": 10, "points": 2}
 ROOM = 40 << 10
-FULL = """import errno, os, zarr.storage._local as local
-put, taken = local._put, []
-def full(path, value, *words, **more):
-    taken.append(len(value))
+FULL = """import errno, os
+from laufruhe.studies.stores import Draws
+keep, taken = Draws.keep, []
+def full(store, mark, seconds, record):
+    taken.append(record["values"].nbytes)
     if sum(taken) > {}:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    return put(path, value, *words, **more)
-local._put = full
+    keep(store, mark, seconds, record)
+Draws.keep = full
 from laufruhe.cli import main; main()"""
 DAY = 86_400.0
 HEAD = """# Many designs, on this machine and on a cluster
@@ -101,15 +102,15 @@ def timed(folder: Path, *words: str) -> tuple[float, float, int]:
 
 def stored(root: Path, part: str) -> tuple[float, int, int, int]:
     """Of a part in a store: core-seconds, draws done, files, bytes."""
-    import zarr
-
-    group = zarr.open_group(root, mode="r")[part]
-    done = np.asarray(group["done"][:])
-    seconds = done[..., 32:].copy().view("<f8")[..., 0]
-    pieces = int(np.any(done, axis=2).sum())
-    files = [path for path in (root / part).rglob("*") if path.is_file()]
-    draws = min(pieces * int(group.attrs["chunk"]), group["values"].shape[0] * group["values"].shape[1])
-    return float(seconds.sum()), draws, len(files), sum(path.stat().st_size for path in files)
+    files = list((root / part).glob("*.npz"))
+    pieces = [np.load(path) for path in files]
+    draws = sum(len(piece["values"]) for piece in pieces)
+    return (
+        sum(float(piece["seconds"]) for piece in pieces),
+        draws,
+        len(files),
+        sum(path.stat().st_size for path in files),
+    )
 
 
 def overheads(own: clusters.Cluster) -> tuple[list[str], float]:
@@ -221,7 +222,7 @@ def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list
             words = {"draws": size, "chunk": 10_000} if which == 0 else {"scenes": size, "few": min(size, 100)}
             here = clusters.prepared(folder / f"{part}{size}", **{**{"draws": 1, "scenes": 1, "points": 2}, **words})
             wall, cores, memory = timed(here, "--jobs", "1")
-            _, done, files, size_of = stored(clusters.regions_in(here / "out"), part)
+            _, done, files, size_of = stored(clusters.draws_in(here / "out"), part)
             assert done == size
             found[which].append(Cost(size, wall, cores, files, size_of, memory))
             shutil.rmtree(here)
@@ -232,7 +233,7 @@ def at_once(folder: Path, solves: int) -> Cost:
     """Random scenes on all processors, by one command."""
     here = clusters.prepared(folder, draws=1, scenes=solves, few=500, points=2)
     wall, _, memory = timed(here)
-    cores, done, files, size = stored(clusters.regions_in(here / "out"), "engines")
+    cores, done, files, size = stored(clusters.draws_in(here / "out"), "engines")
     assert done == solves
     return Cost(done, wall, cores, files, size, memory)
 

@@ -35,7 +35,7 @@ def test_who_draws_is_ready_without_what_studies_and_solvers_need() -> None:
 
 PLAIN = """
 import sys
-sys.modules |= dict.fromkeys(("casadi", "cvxpy", "netCDF4", "openpyxl", "dask", "distributed", "zarr"))
+sys.modules |= dict.fromkeys(("casadi", "cvxpy", "netCDF4", "openpyxl", "dask", "distributed"))
 import laufruhe
 from laufruhe.cli import app
 from typer.testing import CliRunner

@@ -34,7 +34,6 @@ HEAVY = {
     "scipy",
     "xarray",
     "xlsxwriter",
-    "zarr",
 }
 LATE_ROOMS = ("", "cli")
 COMMAND = "command"

@@ -19,7 +19,7 @@ import numpy as np
 import xarray as xr
 
 import laufruhe
-from laufruhe.studies.stores import regions_in
+from laufruhe.studies.stores import draws_in
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "tractor-single.toml"
 STUDY = """
@@ -177,15 +177,13 @@ def results(folder: Path) -> dict[str, bytes]:
 
 def numbers(folder: Path) -> dict[str, bytes]:
     """The arrays of the store, bit by bit."""
-    import zarr
-
-    whole = zarr.open_group(regions_in(folder / "out"), mode="r")
-    return {name: np.asarray(whole[f"{name}/values"]).tobytes() for name in ("designs", "engines")}
+    paths = sorted(draws_in(folder / "out").glob("*/*.npz"))
+    return {f"{path.parent.name}/{path.name}": np.load(path)["values"].tobytes() for path in paths}
 
 
 def pieces_done(folder: Path) -> int:
-    """Regions that say that they are done."""
-    return len(list(regions_in(folder / "out").glob("*/done/c/*/*/*")))
+    """Pieces of draws that are kept."""
+    return len(list(draws_in(folder / "out").glob("*/*.npz")))
 
 
 def same(one: Path, other: Path) -> Sequence[str]:

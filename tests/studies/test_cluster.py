@@ -13,7 +13,7 @@ from lanes import of_clusters
 from laufruhe.cli import app
 from studies import clusters
 
-pytestmark = [pytest.mark.slow, of_clusters("distributed", "zarr")]
+pytestmark = [pytest.mark.slow, of_clusters("distributed")]
 SMALL = {"draws": 2000, "chunk": 500, "scenes": 20, "few": 2, "points": 3}
 KILLED_AT = 6
 

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Record: TypeAlias = dict[str, Any]
+VALUES, COLUMNS = "values", "columns"
+"""Keys of the record of a piece of draws: numbers, shape (draws, columns), and columns by name."""
 
 
 @dataclass(frozen=True)
@@ -28,16 +30,6 @@ class Column:
 
     unit: str
     words: str
-
-
-@dataclass(frozen=True)
-class Template:
-    """Layout of the numbers of many draws: cases, draws of each case, draws of one piece (`chunk`), and columns."""
-
-    cases: tuple[str, ...]
-    draws: int
-    chunk: int
-    columns: Mapping[str, Column]
 
 
 class Part(Table):
@@ -95,9 +87,9 @@ class Part(Table):
         """
         raise NotImplementedError
 
-    def template(self, problem_files: ProblemFiles) -> Template | None:  # noqa: ARG002
-        """Return the layout of records of points with a span; None if each record has a shape of its own."""
-        return None
+    def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:  # noqa: ARG002
+        """Return the columns of numbers that each draw has, by name; empty for a part without draws."""
+        return {}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return records, in the order of the points, as one labelled dataset."""

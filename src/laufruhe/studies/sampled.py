@@ -11,8 +11,7 @@ from pydantic import Field
 from laufruhe.files import fields as f
 from laufruhe.numerics.arrays import Array
 from laufruhe.present import picture as p
-from laufruhe.studies.part import Column, Part, Template
-from laufruhe.studies.regions import COLUMNS, VALUES
+from laufruhe.studies.part import COLUMNS, VALUES, Part
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.units import readable
 
@@ -87,14 +86,6 @@ class Sampled(Part):
             for column_values, (name, column) in zip(values, columns.items(), strict=True)
         }
         return xr.Dataset(variables, {"case": cases}, self.about(seed=self.seed))
-
-    def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:
-        """Return the columns of numbers that each draw has, by name."""
-        raise NotImplementedError
-
-    def template(self, problem_files: ProblemFiles) -> Template | None:
-        """Return the layout of draws."""
-        return Template(tuple(case.name for case in self.cases), self.draws, self.piece, self.columns(problem_files))
 
     @property
     def ends(self) -> tuple[Literal["nc", "csv", "png"], ...]:

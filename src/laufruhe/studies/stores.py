@@ -2,7 +2,7 @@
 
 There are two stores, for two shapes of records. A point of most kinds takes milliseconds to minutes, and the shape of
 its record depends on its engine. Such a record is one line of a file. A changed study keeps the lines of unchanged
-points. Random draws are millions of rows with equal columns; they are regions of one array.
+points. Random draws are millions of rows with equal columns; each piece of them is a file of NumPy arrays.
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ import hashlib
 import json
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from io import FileIO
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
-from laufruhe.studies.part import Part, Record
+import numpy as np
+
+from laufruhe.errors import refused
+from laufruhe.numerics.locks import folder_lock
+from laufruhe.studies.part import COLUMNS, VALUES, Column, Part, Record
 from laufruhe.studies.reader import StudyFile
-from laufruhe.studies.regions import Region, Regions, locked_store
 from laufruhe.studies.scenes import Point, ProblemFiles
 
 Task: TypeAlias = tuple[Part, Point]
@@ -93,34 +96,72 @@ def _checksum(line: bytes) -> bytes:
     return hashlib.sha256(line).hexdigest()[:_SUM].encode()
 
 
+class Draws(AbstractContextManager["Draws"]):
+    """Finished pieces of random draws of one part, each a file of NumPy arrays in a folder that stays.
+
+    A file appears whole under the fingerprint of its piece. A file that is cut, changed or misplaced does not match
+    the checksums or the fingerprint in it, and its piece is computed again.
+    """
+
+    def __init__(self, folder: Path, columns: Mapping[str, Column], points: Mapping[str, Point]) -> None:
+        self._folder, self._columns, self._points, self._locked = folder, columns, points, ExitStack()
+        remedy = "name another place by --out"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            is_locked = self._locked.enter_context(folder_lock(folder, wait=False))
+        except OSError as error:
+            raise refused("results", str(folder), f"cannot be written ({error.strerror})", remedy) from None
+        if is_locked is False:
+            raise refused("results", str(folder), "is being written by another run", f"wait for it, or {remedy}")
+        self.seconds: dict[str, float] = {}
+        for fingerprint in points:
+            # damaged files raise any error of their codec
+            with suppress(Exception), (folder / f"{fingerprint}.npz").open("rb") as stream:
+                piece = np.load(stream)
+                if piece["fingerprint"] == fingerprint and len(piece[VALUES]):
+                    self.seconds[fingerprint] = float(piece["seconds"])
+
+    def read(self, fingerprint: str) -> Record:
+        """Return the record of a piece."""
+        with np.load(self._folder / f"{fingerprint}.npz") as piece:
+            return {VALUES: piece[VALUES], COLUMNS: self._columns}
+
+    def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
+        """Write the file of a finished piece and its computing time [s]."""
+        point, unfinished = self._points[fingerprint], self._folder / "unfinished"
+        about = {"case": point.case.name, "draws": point.span, "quantities": list(self._columns),
+                 "units": [column.unit for column in self._columns.values()]}  # fmt: skip
+        with unfinished.open("wb") as stream:
+            np.savez_compressed(stream, **{VALUES: record[VALUES]}, fingerprint=fingerprint, seconds=seconds, **about)
+        unfinished.replace(self._folder / f"{fingerprint}.npz")
+        self.seconds[fingerprint] = seconds
+
+    def __exit__(self, *_: object) -> None:
+        self._locked.close()
+
+
 def stores_of(
     study: StudyFile, problem_files: ProblemFiles, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
     """Yield each store of results, with the fingerprints of all points that belong to it, finished or not.
 
-    A range of random draws is a region of an array on disk (`Regions`). The record of any other point is a line of the
-    file `finished` (`FinishedPoints`).
+    A range of random draws is a file of its own (`Draws`). The record of any other point is a line of the file
+    `finished` (`FinishedPoints`).
     """
-    fingerprints, root = set(tasks), regions_in(finished.parent)
-    templates = [
-        (part, template) for part in study.study.parts if (template := part.template(problem_files)) is not None
-    ]
-    if templates:
-        stores.enter_context(locked_store(root))
-    for part, template in templates:
-        regions = {
-            fingerprint: Region(template.cases.index(point.case.name), *point.span)
-            for fingerprint, (task_part, point) in tasks.items()
-            if task_part is part and point.span is not None
-        }
-        yield Regions(root, part.name, template, regions), regions
-        fingerprints -= set(regions)
-    yield stores.enter_context(FinishedPoints(finished, fingerprints)), fingerprints
+    others = set(tasks)
+    for part in study.study.parts:
+        if columns := part.columns(problem_files):
+            drawn = {
+                fingerprint: point for fingerprint, (owner, point) in tasks.items() if owner is part and point.span
+            }
+            yield stores.enter_context(Draws(draws_in(finished.parent) / part.name, columns, drawn)), drawn
+            others -= set(drawn)
+    yield stores.enter_context(FinishedPoints(finished, others)), others
 
 
-def regions_in(folder: Path) -> Path:
-    """Return the folder of the store of draws, next to the folder of results."""
-    return folder.with_name(f"{folder.name}.zarr")
+def draws_in(folder: Path) -> Path:
+    """Return the folder of the draws, next to the folder of results."""
+    return folder.with_name(f"{folder.name}.draws")
 
 
 class Records(Sequence[Record]):

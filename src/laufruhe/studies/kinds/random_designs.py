@@ -13,8 +13,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.present import picture as p
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import decision_values
-from laufruhe.studies.part import Column, Record, variable
-from laufruhe.studies.regions import VALUES
+from laufruhe.studies.part import VALUES, Column, Record, variable
 from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene

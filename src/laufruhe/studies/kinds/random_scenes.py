@@ -15,8 +15,7 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.files.study_tables import DrawnTable, Span, span_of
 from laufruhe.present import picture as p
 from laufruhe.solvers.conclusion import decision_values
-from laufruhe.studies.part import Column, Record
-from laufruhe.studies.regions import VALUES
+from laufruhe.studies.part import VALUES, Column, Record
 from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene
