@@ -11,7 +11,7 @@ import sys
 from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn, TextIO
 
 import typer
 from typer.core import TyperGroup
@@ -281,7 +281,6 @@ def trade(
     json: o.JsonOption = None,
     out: o.PagesOption = None,
     time_limit: o.StopOption = None,
-    scheduler: o.SchedulerOption = None,
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
@@ -289,15 +288,20 @@ def trade(
 
     Each fidelity, that is each choice of how exactly the physics is computed, is tried on these problems.
     """
-    with exit_statuses(problems[0]), spoken(quiet, verbose), resources(time_limit, scheduler):
+    with exit_statuses(problems[0]), spoken(quiet, verbose), resources(time_limit, None):
         from laufruhe.cli.fidelity import traded
         from laufruhe.report.screen import show_document
 
         folder = out or Path("results") / "trade"
         with handing_out(json, *problems) as hand_out:
             with progress() as say:
-                document, page, data = traded(problems, folder, say)
-            hand_out(lambda stream: show_document(document, stream, folder, page), data)
+                documents, data = traded(problems, folder, say)
+
+            def show(stream: TextIO) -> None:
+                for document, page in documents:
+                    show_document(document, stream, folder, page)
+
+            hand_out(show, data)
 
 
 def _show_version(is_requested: bool) -> None:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from laufruhe.cli.screen import typed
 from laufruhe.errors import SolverError, refused
 from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
-from laufruhe.files.reader import load, load_tables, tables_of
+from laufruhe.files.reader import load
 from laufruhe.numerics.budget import is_time_over
-from laufruhe.numerics.workers import current_executor, executor_for, unordered_map, worker_count
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -24,10 +21,7 @@ from laufruhe.report import explain, files
 from laufruhe.report import trade as report
 from laufruhe.report.document import Document
 from laufruhe.report.web_page import as_html
-from laufruhe.studies.trade import Trade, effort, timed, trade, traded_part
-
-Pages = dict[str, bytes]
-"""Contents of files by their names."""
+from laufruhe.studies.trade import Trade, timed, trade
 
 
 def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
@@ -50,93 +44,48 @@ def _objective(problem: Problem) -> float:
     return objective_value(problem, evaluate(problem))
 
 
-def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, str, Callable[[], str]]:
-    """Measure error and time of every model fidelity for each problem, and write pages and pictures.
+def traded(
+    paths: Sequence[Path], folder: Path, say: Callable[[str], None]
+) -> tuple[list[tuple[Document, str]], Callable[[], str]]:
+    """Measure error and time of every model fidelity for each problem, and write its page and picture.
 
-    Several problems get an index. Problems with an open flywheel are left out. Return the document to show, the name
-    of its page, and a function that makes JSON.
+    Return the documents to show with the names of their pages, and a function that makes JSON.
     """
-    read = [(path, _with_objective(path)) for path in paths]
-    of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in open_kinds(problem)]
-    if len(of_wheels) == len(read):
-        rule = "is open, but fidelities are compared for a fixed flywheel only"
-        raise refused("flywheel", "", rule, "fix the flywheel", of_wheels[0][0])
-    paths, problems = zip(
-        *((path, problem) for path, problem in read if Kind.FLYWHEEL not in open_kinds(problem)), strict=True
-    )
-    trades: dict[int, Trade] = {}
-    for k, trade_result, pages in _measured(paths, problems, say):
-        trades[k] = trade_result
-        names = [f"{problems[k].name}.{end}" for end in ("md", "png", "html")]
-        with files.staged(files.FileSet(folder, "--out", "trade", names, adds=True)) as stage:
-            for name, page in pages.items():
-                (stage / name).write_bytes(page)
-    if len(trades) < len(problems):
-        what = f"{len(trades)} of {len(problems)} problems, whose pages are in {folder}"
-        raise SolverError(f"the time limit ended the trade after {what}; raise the time limit")
-    ordered = [trades[k] for k in range(len(problems))]
-
-    def as_json() -> str:
-        return "[" + ",\n".join(report.as_json(trade_result).strip() for trade_result in ordered) + "]\n"
-
-    if len(read) == 1:
-        return _page(paths[0], ordered[0]), f"{problems[0].name}.html", as_json
-    index = report.index(ordered, [name for _, name in of_wheels])
-    with files.staged(files.FileSet(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
-        files.write(stage / "README.md", index.as_markdown(""))
-    return index, "README.md", as_json
+    problems = [_with_objective(path) for path in paths]
+    for path, problem in zip(paths, problems, strict=True):
+        if Kind.FLYWHEEL in open_kinds(problem):
+            rule = "is open, but fidelities are compared for a fixed flywheel only"
+            raise refused("flywheel", "", rule, "fix the flywheel", path)
+    trades, documents = list[Trade](), list[tuple[Document, str]]()
+    for path, problem in zip(paths, problems, strict=True):
+        try:
+            trades.append(trade(problem, lambda text, name=problem.name: say(f"{name}: {text}")))  # type: ignore[misc]
+        except SolverError:
+            if not trades or not is_time_over():
+                raise
+            what = f"{len(trades)} of {len(problems)} problems, whose pages are in {folder}"
+            raise SolverError(f"the time limit ended the trade after {what}; raise the time limit") from None
+        documents.append((_written(path, trades[-1], folder), f"{problem.name}.html"))
+    return documents, lambda: "[" + ",\n".join(report.as_json(measured).strip() for measured in trades) + "]\n"
 
 
-def _measured(
-    paths: Sequence[Path], problems: Sequence[Problem], say: Callable[[str], None]
-) -> Iterator[tuple[int, Trade, Pages]]:
-    """Yield index, measurements and pages of every problem; several are measured in parallel."""
-    if len(problems) == 1 and current_executor() is None:
-        trade_result = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
-        yield 0, trade_result, _pages(paths[0], trade_result)
-        return
-    # the longest comes first, so that all end at about the same time
-    order = sorted(range(len(problems)), key=lambda k: effort(problems[k]), reverse=True)
-    pieces = [(paths[k], tables_of(paths[k])) for k in order]
-    with (
-        executor_for(min(len(pieces), worker_count())) as executor,
-        closing(unordered_map(_measured_by_worker, pieces, executor, patient=True)) as answers,
-    ):
-        for place, answer in answers:
-            if answer is not None:
-                k, (trade_result, pages) = order[place], answer
-                say(f"{problems[k].name} is measured")
-                yield k, replace(trade_result, problem=traded_part(problems[k])), pages
-
-
-def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] | None:
-    # functions have no pickle; a worker without time has no answer
-    path, tables = piece
-    try:
-        trade_result = trade(load_tables(tables, path))
-    except SolverError:
-        if is_time_over():
-            return None
-        raise
-    return replace(trade_result, problem=replace(trade_result.problem, phasing=None)), _pages(path, trade_result)
-
-
-def _pages(path: Path, trade_result: Trade) -> Pages:
-    # the pages are Markdown, HTML, and the picture if there is one
-    from laufruhe.plots.style import as_png, as_svg
+def _written(path: Path, measured: Trade, folder: Path) -> Document:
+    """Write the pages of a trade and the picture if there is one; return the document without it."""
+    from laufruhe.plots.style import as_svg, save
     from laufruhe.plots.trade import figure, has_picture
 
-    name, pages, pictures = trade_result.problem.name, Pages(), dict[str, str]()
-    if has_picture(trade_result):
-        picture = figure(trade_result)
-        pages[f"{name}.png"], pictures[name] = as_png(picture), as_svg(picture)
-    document = _page(path, trade_result, next(iter(pictures), None))
-    texts = {"md": document.as_markdown(".png"), "html": as_html(document, pictures)}
-    return pages | {f"{name}.{end}": text.encode() for end, text in texts.items()}
-
-
-def _page(path: Path, trade_result: Trade, picture: str | None = None) -> Document:
-    return report.trade_document(trade_result, picture, typed("laufruhe", "trade", str(path)))
+    name, command = measured.problem.name, typed("laufruhe", "trade", str(path))
+    names = [f"{name}.{end}" for end in ("md", "png", "html")]
+    with files.staged(files.FileSet(folder, "--out", "trade", names, adds=True)) as stage:
+        pictures = dict[str, str]()
+        if has_picture(measured):
+            picture = figure(measured)
+            save(picture, stage / f"{name}.png")
+            pictures[name] = as_svg(picture)
+        document = report.trade_document(measured, next(iter(pictures), None), command)
+        files.write(stage / f"{name}.md", document.as_markdown(".png"))
+        files.write(stage / f"{name}.html", as_html(document, pictures))
+    return document
 
 
 def _with_objective(path: Path) -> Problem:

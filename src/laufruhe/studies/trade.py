@@ -22,10 +22,8 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.shaking_loads import forget, shaking_loads
-from laufruhe.physics.steady_state import TimeMounting, viscous_forces
+from laufruhe.physics.shaking_loads import forget
 from laufruhe.physics.uneven_speed import crank_motion
-from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -97,18 +95,6 @@ class TradeRow:
 
 
 @dataclass(frozen=True)
-class TimeDomain:
-    """Difference between mount forces in the time and frequency domains, relative to their peak.
-
-    `integration` compares the same equations, `loss` hysteretic loss, which has no law in time (E26).
-    """
-
-    point: str
-    integration: float
-    loss: float
-
-
-@dataclass(frozen=True)
 class Trade:
     """Measurements of all fidelities on one problem, and the reference.
 
@@ -119,8 +105,6 @@ class Trade:
     flywheel
         Crank inertia with which uneven speed was computed [kg m2], and the relative
         change of the objective that the uneven speed makes; None if no measure is of a load.
-    time_domain
-        Difference of mount forces between time and frequency domain; None for rigid mounts.
     left_out
         Sentences about parts of the problem that a trade does not include.
     """
@@ -130,7 +114,6 @@ class Trade:
     value: float
     optimum: float
     flywheel: tuple[float, float] | None
-    time_domain: TimeDomain | None
     left_out: tuple[str, ...] = ()
     is_complete: bool = True
 
@@ -145,7 +128,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     left_out = [f"The trade takes the drawing, without {extra.words}." for extra in problem.extras]
     if len(problem.ranks) > 1:
         left_out.insert(0, f"The trade takes the first of {len(problem.ranks)} objectives.")
-    problem = traded_part(problem)
+    problem = problem.changed(ranks=(), extras=())
     scale, rows, is_complete = ErrorReference.of(problem), list[TradeRow](), False
     batch = Batch(problem)
     with working_on(SERIAL):
@@ -170,7 +153,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     elif minimum > 0.0:
         rows = [replace(row, regret=row.optimum / minimum - 1.0) for row in rows]
     value = objective_value(problem, scale.best)
-    return Trade(problem, tuple(rows), value, minimum, flywheel, _price_of_time(problem), tuple(left_out), is_complete)
+    return Trade(problem, tuple(rows), value, minimum, flywheel, tuple(left_out), is_complete)
 
 
 def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
@@ -220,19 +203,9 @@ def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
     ]
 
 
-def traded_part(problem: Problem) -> Problem:
-    """Return the problem that a trade measures: one with the first objective only."""
-    return problem.changed(ranks=(), extras=())
-
-
 def is_open(problem: Problem) -> bool:
     """Return True if a problem leaves anything to decide."""
     return bool(problem.decisions or problem.phasing)
-
-
-def effort(problem: Problem) -> tuple[bool, int]:
-    """Return a sort key for the duration of a trade: open stars and mounts last, then by the number of decisions."""
-    return problem.phasing is not None or bool(problem.mount_decisions), len(problem.decisions)
 
 
 class Batch:
@@ -307,27 +280,6 @@ def measured(name: str, variant: Problem, scale: ErrorReference, batch: Batch) -
 
 def _times_faster(problem: Problem, times: float) -> Problem:
     return replace(problem, points=tuple(replace(point, speed=times * point.speed) for point in problem.points))
-
-
-def _price_of_time(problem: Problem) -> TimeDomain | None:
-    """Return how mount forces integrated in time differ from the frequency domain, at the first operating point."""
-    if problem.engine.block is None or not mounting_in(problem.engine).dynamic.has_law:
-        return None
-    point, mounting = problem.points[0], mounting_in(problem.engine)
-    wrench = shaking_loads(problem.engine, point, Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS))
-    in_time, viscous, hysteretic = (
-        forces.sample(TIME_SAMPLES)
-        for forces in (
-            TimeMounting(mounting, TIME_SAMPLES).forces(wrench, point.speed),
-            viscous_forces(mounting, wrench, point.speed),
-            mounting.forces(wrench, point.speed),
-        )
-    )
-    peak = float(np.abs(viscous).max())
-    return TimeDomain(
-        point.name,
-        *(float(np.abs(in_time - reference_forces).max()) / peak for reference_forces in (viscous, hysteretic)),
-    )
 
 
 def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
