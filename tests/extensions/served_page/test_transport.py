@@ -6,15 +6,13 @@ import http.client
 import json
 import socket
 import threading
-import time
-from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing
 
 import pytest
 
-from laufruhe.extensions.served_page import transport
 from laufruhe.extensions.served_page.guard import HEADERS, TOKEN
-from laufruhe.extensions.served_page.transport import MAX_AT_ONCE, MAX_BYTES, HttpAnswer, Server
+from laufruhe.extensions.served_page.transport import MAX_BYTES, HttpAnswer, HttpRequest, Server
 
 SECRET = "the problem"
 PATIENCE = 60.0
@@ -51,13 +49,6 @@ def asked(
         connection.endheaders(body)
         answer = connection.getresponse()
         return answer, answer.read()
-
-
-def wait_for(holds: Callable[[], bool]) -> None:
-    until = time.monotonic() + PATIENCE
-    while not holds() and time.monotonic() < until:
-        time.sleep(0.01)
-    assert holds()
 
 
 def test_who_has_the_token_is_answered(server: Server) -> None:
@@ -156,78 +147,12 @@ def test_nobody_beyond_this_machine_is_listened_to(server: Server) -> None:
     assert server.socket.getsockname()[0] == "127.0.0.1"
 
 
-def test_more_requests_at_work_than_there_may_be_are_refused_and_room_comes_back(server: Server) -> None:
-    # connections of other tests take room until their threads have ended
-    wait_for(lambda: server._room._value == MAX_AT_ONCE)
-    done, started = threading.Event(), threading.Semaphore(0)
-
-    def work(_: object) -> HttpAnswer:
-        started.release()
-        done.wait(PATIENCE)
-        return HttpAnswer("{}")
-
-    server.handles["/work"] = work
-    asking = [threading.Thread(target=asked, args=(server, "/work")) for _ in range(MAX_AT_ONCE)]
-    try:
-        for thread in asking:
-            thread.start()
-        for _ in asking:
-            assert started.acquire(timeout=PATIENCE)
-        with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as one_more:
-            assert one_more.recv(1) == b""
-    finally:
-        done.set()
-        for thread in asking:
-            thread.join(PATIENCE)
-    wait_for(lambda: server._room._value > 0)
-    assert asked(server)[0].status == 200
-
-
-@pytest.mark.parametrize("sent", [b"", b"POST /told HTTP/1.1\r\nHost: x\r\n"])
-def test_slow_connections_give_way_to_who_asks(server: Server, sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    # without a deadline these would stay, so that who asks is answered only if they give way
-    monkeypatch.setattr(transport, "READ", 1e6)
-    wait_for(lambda: server._room._value == MAX_AT_ONCE)
-    slow = [socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) for _ in range(MAX_AT_ONCE)]
-    try:
-        for connection in slow:
-            connection.sendall(sent)
-        wait_for(lambda: server._room._value == 0)
-        for _ in range(3):
-            assert asked(server)[0].status == 200
-        # the oldest has been closed, the newest is still waited for
-        assert slow[0].recv(1) == b""
-        slow[-1].settimeout(0.05)
-        with pytest.raises(TimeoutError):
-            slow[-1].recv(1)
-    finally:
-        for connection in slow:
-            connection.close()
-
-
-def trickle(connection: socket.socket, data: bytes) -> bool:
-    """Whether the server has ended a connection over which one byte after the other is sent."""
-    with suppress(OSError):
-        connection.settimeout(0.02)
-        for byte in data:
-            connection.sendall(bytes([byte]))
-            with suppress(TimeoutError):
-                return connection.recv(1) == b""
-        return False
-    return True
-
-
-def test_a_request_has_to_arrive_by_its_deadline(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(transport, "READ", 0.2)
-    with socket.create_connection(("127.0.0.1", server.port)) as connection:
-        assert trickle(connection, b"G" * 3000)
-
-
-def test_a_connection_sends_so_much_and_no_more(server: Server) -> None:
-    head = b"GET /page.js HTTP/1.1\r\n" + b"".join(b"A%d: %s\r\n" % (k, b"x" * 60_000) for k in range(20))
-    with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as connection, suppress(OSError):
-        connection.sendall(head)
+def test_a_silent_connection_is_ended(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(HttpRequest, "timeout", 0.2)
+    with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as connection:
+        connection.sendall(b"POST /told HTTP/1.1\r\n")
         assert connection.recv(1) == b""
+    assert asked(server)[0].status == 200
 
 
 def test_a_connection_carries_one_request(server: Server) -> None:

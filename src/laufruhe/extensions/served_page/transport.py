@@ -1,12 +1,9 @@
-"""HTTP on the loopback interface, with limits on size, number and duration of requests."""
+"""HTTP on the loopback interface, with limits on size and duration of requests."""
 
 from __future__ import annotations
 
-import io
 import json
 import socket
-import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,10 +13,10 @@ from typing import Any
 
 from laufruhe.extensions.served_page.guard import HEADERS, HOST, TOKEN, Guard
 
-MAX_BYTES, MAX_HEAD, MAX_AT_ONCE = 64_000, 32_000, 32
-"""Largest number of bytes of a request's body, of its head, and of simultaneous connections."""
-READ, WRITE, EVICTION = 5.0, 20.0, 2.0
-"""Seconds for a request to arrive, for a client to take an answer, and for an evicted connection to end."""
+MAX_BYTES = 64_000
+"""Largest number of bytes of a request's body."""
+READ, WRITE = 5.0, 20.0
+"""Seconds that the parts of a request, and a client that takes an answer, may pause."""
 _TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
 _JSON = "application/json"
 
@@ -41,7 +38,7 @@ class Server(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
-    request_queue_size = MAX_AT_ONCE
+    request_queue_size = 32
 
     def __init__(self, port: int, files: Mapping[str, str]) -> None:
         super().__init__((HOST, port), HttpRequest)
@@ -49,44 +46,6 @@ class Server(ThreadingHTTPServer):
         self.guard = Guard(self.port)
         self.files = {f"/{name}": text.encode() for name, text in files.items()}
         self.handles: dict[str, Handle] = {}
-        self._room = threading.BoundedSemaphore(MAX_AT_ONCE)
-        self._readers: dict[socket.socket, None] = {}
-        self._lock = threading.Lock()
-
-    def process_request(self, request: Any, client_address: Any) -> None:
-        """Start a thread for a connection; if all threads are in use, end the slowest sender's, or refuse."""
-        has_room = self._room.acquire(blocking=False)
-        if not has_room and self._evict():
-            has_room = self._room.acquire(timeout=EVICTION)
-        if not has_room:
-            self.shutdown_request(request)
-            return
-        with self._lock:
-            self._readers[request] = None
-        super().process_request(request, client_address)
-
-    def _evict(self) -> bool:
-        with self._lock:
-            slowest = next(iter(self._readers), None)
-            if slowest is None:
-                return False
-            del self._readers[slowest]
-            with suppress(OSError):
-                slowest.shutdown(socket.SHUT_RDWR)
-        return True
-
-    def has_read(self, request: socket.socket) -> None:
-        """Note that a connection has sent all of its request."""
-        with self._lock:
-            self._readers.pop(request, None)
-
-    def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Handle the requests of one connection in its thread."""
-        try:
-            super().process_request_thread(request, client_address)
-        finally:
-            self.has_read(request)
-            self._room.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore clients that have gone away; log nothing."""
@@ -99,29 +58,6 @@ class Server(ThreadingHTTPServer):
         self.server_name, self.server_port = HOST, self.server_address[1]
 
 
-class _Incoming(io.RawIOBase):
-    """Bytes of a request, limited in number and total time."""
-
-    def __init__(self, connection: socket.socket) -> None:
-        self._connection = connection
-        self._room = MAX_HEAD + MAX_BYTES
-        self._until = time.monotonic() + READ
-
-    def readable(self) -> bool:
-        """Return True."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Return the number of bytes received; `TimeoutError` beyond the limits."""
-        remaining = self._until - time.monotonic()
-        if remaining <= 0.0 or self._room <= 0:
-            raise TimeoutError
-        self._connection.settimeout(remaining)
-        count = self._connection.recv_into(memoryview(buffer)[: self._room])
-        self._room -= count
-        return count
-
-
 class HttpRequest(BaseHTTPRequestHandler):
     """Connection that carries a single request."""
 
@@ -130,20 +66,14 @@ class HttpRequest(BaseHTTPRequestHandler):
     sys_version = ""
     disable_nagle_algorithm = True
     wbufsize = -1
+    timeout = READ
     server: Server
-
-    def setup(self) -> None:
-        """Prepare reading with a deadline."""
-        super().setup()
-        self.rfile.close()
-        self.rfile = io.BufferedReader(_Incoming(self.connection))
 
     def log_message(self, format: str, *args: object) -> None:
         """Log nothing: others may read a log."""
 
     def do_GET(self) -> None:
         """Send the page and its script files, which contain no data of the problem."""
-        self.server.has_read(self.connection)
         path = "/page.html" if self.path == "/" else self.path
         refusal = self.server.guard.refusal("GET", self._headers())
         if refusal:
@@ -166,7 +96,6 @@ class HttpRequest(BaseHTTPRequestHandler):
             self._refused(HTTPStatus.NOT_FOUND, "this server knows no such request")
         else:
             body = self._body()
-            self.server.has_read(self.connection)
             if body is not None:
                 self._answer(self._exchanged(body) if self.path == "/token" else self.server.handles[self.path](body))
 
