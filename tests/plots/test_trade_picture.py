@@ -6,10 +6,8 @@ import math
 from itertools import combinations, pairwise
 from typing import Any, cast
 
-import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PathCollection
 
 from cli import scenes
 from laufruhe.plots import trade
@@ -26,7 +24,7 @@ def _trade(errors: list[float]) -> Trade:
         for k, error in enumerate(errors)
     )  # fmt: skip
     unused = cast(Any, None)
-    return Trade(scenes.problem_of(scenes.PARTS), rows, 1.0, 0.5, unused, unused, unused)
+    return Trade(scenes.problem_of(scenes.PARTS), rows, 1.0, 0.5, unused)
 
 
 @pytest.mark.parametrize(
@@ -53,16 +51,3 @@ def test_names_stand_in_the_order_of_their_errors() -> None:
     figure = trade.figure(_trade(errors))
     heights = {error: text.get_position()[1] for error, text in zip(errors, figure.axes[0].texts, strict=True)}
     assert all(heights[low] < heights[high] for low, high in pairwise(sorted(heights)))
-
-
-def test_dots_of_errors_too_small_to_tell_do_not_pile_up() -> None:
-    """They stand in a band under the axis, no two on each other."""
-    figure = trade.figure(_trade([0.0] * 12 + [1e-5, 1.0]))
-    axes = figure.axes[0]
-    (found,) = (each for each in axes.collections if isinstance(each, PathCollection))
-    dots = np.asarray(found.get_offsets())
-    assert len(dots) == 14
-    pixels = axes.transData.transform(dots)
-    assert min(math.dist(one, other) for one, other in combinations(pixels, 2)) > 0.9 * trade.DOT * figure.dpi
-    assert sum(dots[:, 1] < trade.MIN_ERROR) == 12
-    assert axes.get_ylim()[0] < dots[:, 1].min()

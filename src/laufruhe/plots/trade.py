@@ -17,8 +17,8 @@ from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
 from laufruhe.studies.trade import DESIGNS, Trade
 
 MIN_ERROR = 1e-7
-PANEL, DOT = (5.4, 4.4), 0.13
-"""Width and height of the panel, and room of a dot [inch]."""
+PANEL = (5.4, 4.4)
+"""Width and height of the panel [inch]."""
 NAME_HEIGHT = 0.036
 """Height of a name relative to the panel."""
 _NAMES = 1.03
@@ -91,7 +91,8 @@ def _draw(axes: Axes, panel: _Panel) -> None:
     times = panel.times
     axes.set(xscale="log", yscale="log", xlabel=panel.x, ylabel=panel.y)
     axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
-    errors = _places(axes, panel.errors, times)
+    errors = np.maximum(panel.errors, MIN_ERROR)
+    axes.set_ylim(0.5 * errors.min(), 2.0 * max(errors.max(), 2.0 * MIN_ERROR))
     front: list[int] = []
     for k in np.lexsort((panel.errors, times)):
         if not front or panel.errors[k] < panel.errors[front[-1]]:
@@ -103,35 +104,12 @@ def _draw(axes: Axes, panel: _Panel) -> None:
     if times.max() < _FEW_DECADES * times.min():
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(_PLAIN)
-    # the band under the axis has its own label
-    minimum = 1.01 * MIN_ERROR if panel.errors.min() < MIN_ERROR else 0.0
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > minimum else ""))
+    # smaller errors are drawn here
+    least = f"under {_power(MIN_ERROR)}"
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > 1.01 * MIN_ERROR else least))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     _name(axes, panel.names, times, errors)
-
-
-def _places(axes: Axes, errors: Array, times: Array) -> Array:
-    """Return the drawn errors; very small errors are drawn in a band below the axis."""
-    small = errors < MIN_ERROR
-    width, height = PANEL
-    low, end = np.log10(axes.get_xlim())
-    across = width * (np.log10(times) - low) / (end - low)
-    levels = np.zeros(len(errors), dtype=int)
-    for j, k in enumerate(order := [k for k in np.argsort(times, kind="stable") if small[k]]):
-        used = {levels[neighbour] for neighbour in order[:j] if across[k] - across[neighbour] < DOT}
-        levels[k] = next(level for level in range(len(errors)) if level not in used)
-    band = DOT * (levels.max(initial=0) + 1.5) if small.any() else 0.0
-    minimum = MIN_ERROR if small.any() else 0.5 * errors.min()
-    top = 2.0 * max(errors.max(), 2.0 * minimum)
-    decades = (math.log10(top) - math.log10(minimum)) / max(height - band, 0.5 * height)
-    axes.set_ylim(minimum * 10.0 ** (-decades * band), top)
-    if small.any():
-        axes.axhspan(axes.get_ylim()[0], minimum, color="#f0f2f4", linewidth=0.0, zorder=0.4)
-        middle = math.sqrt(minimum * axes.get_ylim()[0])
-        axes.text(-0.02, middle, f"under {_power(minimum)}", transform=axes.get_yaxis_transform(), ha="right",
-                  va="center", color=FAINT, size=SMALL)  # fmt: skip
-    return np.where(small, minimum * 10.0 ** (-decades * DOT * (levels + 0.75)), errors)
 
 
 def _name(axes: Axes, names: tuple[str, ...], times: Array, errors: Array) -> None:

@@ -142,7 +142,7 @@ def _critical_speeds(result: Result) -> Table:
 
 SECTION = Section(
     "torsion", is_twisted, _tables, _record,
-    ("crankshaft-modes", "strongest-critical-speeds-initial", "strongest-critical-speeds-as-decided", "barred-speeds"),
+    ("crankshaft-modes", "strongest-critical-speeds-initial", "strongest-critical-speeds-final", "barred-speeds"),
     {
         "twist-response": (is_twisted, _twist_response),
         "twist-modes": (is_twisted, _twist_modes),
