@@ -161,7 +161,6 @@ def solve(
     out: o.OutOption = None,
     no_plots: o.NoPlotsOption = False,
     kind: o.FormatOption = o.Format.SVG,
-    animate: o.AnimateOption = False,
     tolerance: o.ToleranceOption = None,
     time_limit: o.LimitOption = None,
     solver: o.SolverOption = None,
@@ -179,7 +178,7 @@ def solve(
         from laufruhe.cli.solve import run, solve
 
         command = command_line(context)
-        run(Request("solve", problem, json, out, kinds, ask, command, animate, tolerance, series, solver), solve)
+        run(Request("solve", problem, json, out, kinds, ask, command, tolerance, series, solver), solve)
 
 
 @app.command(epilog=o.examples("laufruhe evaluate problem.toml --series --json -"))
@@ -190,7 +189,6 @@ def evaluate(
     out: o.InitialOutOption = None,
     no_plots: o.NoPlotsOption = False,
     kind: o.FormatOption = o.Format.SVG,
-    animate: o.AnimateOption = False,
     series: o.SeriesOption = False,
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
@@ -204,7 +202,7 @@ def evaluate(
         from laufruhe.cli.solve import evaluate, run
 
         command = command_line(context)
-        run(Request("evaluate", problem, json, out, kinds, ask, command, animate, series=series), evaluate)
+        run(Request("evaluate", problem, json, out, kinds, ask, command, series=series), evaluate)
 
 
 @app.command(epilog=o.examples("laufruhe study tractor-sweeps.toml --jobs 4"))

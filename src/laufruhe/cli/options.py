@@ -56,8 +56,6 @@ class Format(StrEnum):
 
 FORMAT = "Format of the picture files; the HTML report holds its own."
 FormatOption = Annotated[Format, typer.Option("--format", help=FORMAT)]
-ANIMATE = "Make engine.gif: the engine turning, with the forces that it leaves free."
-AnimateOption = Annotated[bool, typer.Option("--animate", help=ANIMATE)]
 NO_PLOTS = "Draw no pictures; those of an earlier result are removed."
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help=NO_PLOTS)]
 SERIES = "Add the loads over the cycle to the JSON."

@@ -28,12 +28,6 @@ def write_results(
 
     `wait_for_pictures` returns the pictures as SVG, by name.
     """
-    if request.animated:
-        from laufruhe.plots.motion import animate
-
-        say("animating")
-        with timed(result.timing, "animation"):
-            animate(result, stage / files.MOTION)
     say("writing tables")
     with ExitStack() as stack:
         with timed(result.timing, "tables"):

@@ -57,7 +57,6 @@ class Request:
     kinds: tuple[str, ...]
     ask: Ask
     command: str
-    animated: bool = False
     tolerance: float | None = None
     series: bool = False
     solver: str | None = None

@@ -1,4 +1,4 @@
-"""The engine to scale at any crank angle, from the front and the left: cranks, pistons, weights, shafts, mounts."""
+"""The engine to scale, from the front and the left: cranks, pistons, weights, shafts, mounts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from laufruhe.machine.rotor import Role
 from laufruhe.plots.style import AFTER, GREY, ORANGE, PALE, Page, entry_of_dots, page
 from laufruhe.plots.words import FAINT, INK, SMALL, round_ticks, width_of
 from laufruhe.present.measures import is_changed
-from laufruhe.present.poses import THICKNESS, Pose, bore_of, direction, half_disc
+from laufruhe.present.poses import THICKNESS, Pose, bore_of, half_disc
 from laufruhe.problem.decision import Kind
 from laufruhe.solvers.result import Result
 
@@ -191,19 +191,19 @@ def views(view: EngineView) -> Page:
     return drawn
 
 
-def draw_views(drawn: Page, view: EngineView, phi: float = 0.0) -> None:
-    """Draw both views at a crank angle [rad]."""
+def draw_views(drawn: Page, view: EngineView) -> None:
+    """Draw both views at a crank angle of zero."""
     front, side = drawn.panels
-    _front(front, view, phi)
-    _side(side, view, phi)
+    _front(front, view)
+    _side(side, view)
     front.set_title("from the front, turning clockwise", loc="left", size=SMALL)
     side.set_title(view.side_view, loc="left", size=SMALL)
 
 
-def _front(axes: Axes, view: EngineView, phi: float) -> None:
+def _front(axes: Axes, view: EngineView) -> None:
     """Draw the view from the front: y to the right, z up, turning clockwise (C3)."""
     # draw from back to front
-    poses = [Pose.at_angle(part, phi) for part in sorted(view.engine.slider_cranks, key=lambda part: part.x)]
+    poses = [Pose.at_angle(part, 0.0) for part in sorted(view.engine.slider_cranks, key=lambda part: part.x)]
     bore, places = bore_of(view.engine), dict[str, complex]()
     for k, pose in enumerate(poses):
         behind = 4.0 + k / len(poses)
@@ -219,7 +219,7 @@ def _front(axes: Axes, view: EngineView, phi: float) -> None:
     for number, place in places.items() if view.is_star else ():
         axes.text(*at(place), number, ha="center", va="center", size=SMALL, zorder=6.0)
     for rotor in view.weights:
-        centre, along = complex(rotor.shaft.z, rotor.shaft.y), direction(rotor, phi)
+        centre, along = complex(rotor.shaft.z, rotor.shaft.y), cmath.phase(rotor.unbalance)
         middle = 90.0 - math.degrees(along)
         radius = MM * half_disc(abs(rotor.unbalance))
         axes.add_patch(Wedge(at(centre), radius, middle - 90.0, middle + 90.0, zorder=3.0, **_weight_look(view, rotor)))
@@ -231,10 +231,10 @@ def _front(axes: Axes, view: EngineView, phi: float) -> None:
     axes.set(xlabel="y [mm]", ylabel="z [mm]")
 
 
-def _side(axes: Axes, view: EngineView, phi: float) -> None:
+def _side(axes: Axes, view: EngineView) -> None:
     """Draw the view from the left (z up) or from above (y down), the front of the engine at the left."""
     bore = bore_of(view.engine)
-    poses = [Pose.at_angle(part, phi) for part in view.engine.slider_cranks]
+    poses = [Pose.at_angle(part, 0.0) for part in view.engine.slider_cranks]
     quarter, pistons = 0.5 * math.pi if view.is_flat else 0.0, list[tuple[Pose, float]]()
 
     def level(place: complex) -> float:
@@ -268,7 +268,7 @@ def _side(axes: Axes, view: EngineView, phi: float) -> None:
     if not view.is_star:
         _numbers(axes, pistons, quarter, bore)
     for rotor in view.weights:
-        radius, along = half_disc(abs(rotor.unbalance)), direction(rotor, phi) - quarter
+        radius, along = half_disc(abs(rotor.unbalance)), cmath.phase(rotor.unbalance) - quarter
         # lowest and highest point of the half disc about its centre
         up, across = math.cos(along), radius * abs(math.sin(along))
         low, high = -radius if up < 0.0 else -across, radius if up > 0.0 else across

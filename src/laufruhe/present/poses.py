@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from laufruhe.machine import Engine, Rotor, SliderCrank
+from laufruhe.machine import Engine, SliderCrank
 from laufruhe.machine.bodies import Outline
 
 STEEL = 7850.0
@@ -49,11 +49,6 @@ class Pose:
 def half_disc(unbalance: float) -> float:
     """Return the radius of a steel half disc with this unbalance [m]: its centroid is 4 R / 3 pi off."""
     return math.cbrt(1.5 * unbalance / (STEEL * THICKNESS))
-
-
-def direction(rotor: Rotor, phi: float) -> float:
-    """Return the angle of a rotor's unbalance from z towards y [rad]."""
-    return cmath.phase(rotor.unbalance) + rotor.shaft.ratio * phi
 
 
 def bore_of(engine: Engine) -> float:

@@ -23,7 +23,6 @@ from laufruhe.report.strict_json import is_ours
 RESULT = "result.json"
 REPORT = "report.md"
 PAGE, BOOK = "report.html", "tables.xlsx"
-MOTION = "engine.gif"
 KINDS = ("png", "svg")
 """Endings of picture files."""
 TABLES = (
@@ -44,7 +43,7 @@ def result_files() -> tuple[str, ...]:
     """Return the names of all files that a result may have."""
     added = [(*section.printed, *section.number_tables) for section in EXTENSION_SECTIONS.values()]
     return (
-        RESULT, REPORT, PAGE, BOOK, MOTION,
+        RESULT, REPORT, PAGE, BOOK,
         *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
         *(f"{name}.csv" for name in (*TABLES, *sum(added, ()))),
     )  # fmt: skip
