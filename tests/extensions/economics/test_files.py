@@ -57,7 +57,7 @@ def test_economics_by_its_command(tmp_path: Path) -> None:
     assert float(data["gap"].max()) < 1e-4
     # five cylinders at the power of three: forces 3/5 of those of the five as drawn (eq. 23)
     assert float(data["optimum"].sel(build="five cylinders")) == pytest.approx(0.6 * 515.0, rel=1e-3)
-    assert not worths(data)[0].worth
+    assert not next(iter(worths(data).values()))[0]
     report = (out / "report.md").read_text(encoding="utf-8")
     assert "| first order: against plain (Fig. 17) | noticeable | -15.2 % of the force | yes |" in report
     assert "five cylinders, no shafts, equal power" in report

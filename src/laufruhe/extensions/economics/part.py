@@ -210,19 +210,19 @@ class Economics(Part):
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
         """Return the tables of the report: engines at their optimum, verdicts, statements of the source, trade-offs."""
-        evaluate_design = {worth.build: worth for worth in worths(data)}
+        judgements = worths(data)
         unit, plain = data["optimum"].attrs["units"], float(data["optimum"].isel(build=0))
         head = ["engine", "shafts", "mass on them [kg]", f"{data.attrs['objective']} [{unit}]", f"lower bound [{unit}]",
                 f"{data.attrs['counterpart']} [{unit}]", "change from plain", "worth building"]  # fmt: skip
         rows = []
         for name in data["build"].values:
             row = data.sel(build=name)
-            force, worth = float(row["optimum"]), evaluate_design.get(str(name))
+            force, (worth, why) = float(row["optimum"]), judgements.get(str(name), (False, ""))
             label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == MORE_CYLINDERS else str(name)
             cells = [label, str(int(row["shafts"])), fixed(float(row["optimum_mass"]), 2), number(force)]
             change = DASH if force == plain else percent(force / plain - 1.0)
             cells += [number(float(row["optimum_bound"]), 6), number(float(row["optimum_counterpart"])), change]
-            rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else DASH])
+            rows.append([*cells, f"{'**yes**' if worth else 'no'}: {why}" if why else DASH])
         return [
             marked_table(head, rows),
             *statement_table([v for claims in verdicts(data).values() for v in claims]),

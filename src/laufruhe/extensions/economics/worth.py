@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -100,30 +100,6 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> list[FrontPoint]:
     return [*(free if limit >= free.mass else best(problem, limit) for limit in mass_limits), free]
 
 
-@dataclass(frozen=True)
-class Worth:
-    """Effect of one set of shafts, and the judgement by W3.
-
-    Attributes
-    ----------
-    build
-        Name of the set of shafts.
-    fall, further_fall
-        Relative fall of the force from the plain engine, and from the best engine with fewer shafts.
-    beside_next
-        Force over that of the first plain engine with more cylinders at equal power.
-    worth, why
-        True if the shafts are worth building, and the reason.
-    """
-
-    build: str
-    fall: float
-    further_fall: float
-    beside_next: float
-    worth: bool
-    why: str
-
-
 class _Engine(NamedTuple):
     """Engine of an economics dataset: shafts, least force and its lower bound."""
 
@@ -140,16 +116,15 @@ def _engines(data: xr.Dataset) -> dict[str, _Engine]:
     return {row[0]: _Engine(*row) for row in rows}
 
 
-def worths(data: xr.Dataset) -> tuple[Worth, ...]:
-    """Judge every set of shafts of an economics dataset by W3."""
+def worths(data: xr.Dataset) -> dict[str, tuple[bool, str]]:
+    """Return for each set of shafts of an economics dataset True if it is worth building (W3), and the reason."""
     engines = _engines(data)
-    return tuple(_worth(engines, engine) for engine in engines.values() if engine.standing == SHAFTS and engine.shafts)
+    built = (engine for engine in engines.values() if engine.standing == SHAFTS and engine.shafts)
+    return {engine.name: _worth(engines, engine) for engine in built}
 
 
-def _worth(engines: Mapping[str, _Engine], engine: _Engine) -> Worth:
-    plain, next_one = (
-        next(e for e in engines.values() if e.standing == standing) for standing in (PLAIN, MORE_CYLINDERS)
-    )
+def _worth(engines: Mapping[str, _Engine], engine: _Engine) -> tuple[bool, str]:
+    next_one = next(e for e in engines.values() if e.standing == MORE_CYLINDERS)
     fewer = min(e.force for e in engines.values() if e.standing != MORE_CYLINDERS and e.shafts < engine.shafts)
     following = next_one.name
     further, ratio = 1.0 - engine.force / fewer, engine.force / next_one.force
@@ -164,8 +139,7 @@ def _worth(engines: Mapping[str, _Engine], engine: _Engine) -> Worth:
         why = f"{following} without shafts run as smoothly: {percent(1.0 / ratio - 1.0)}"
     else:
         why = f"{percent(-further)}, and {percent(ratio - 1.0)} against {following} without shafts"
-    worth = further >= NOTICEABLE and ratio < 1.0 - NEGLIGIBLE
-    return Worth(engine.name, 1.0 - engine.force / plain.force, further, ratio, worth, why)
+    return further >= NOTICEABLE and ratio < 1.0 - NEGLIGIBLE, why
 
 
 def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
@@ -198,5 +172,5 @@ def _apply_rule(engines: Mapping[str, _Engine], engine: _Engine, against: _Engin
         return 1.0 - engine.force / against.force >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
     if says == "better":
         return engine.force < against.bound, "its force is below the other's lower bound"
-    judgement = _worth(engines, engine)
-    return judgement.worth == (says == "worth building"), f"W3: {judgement.why}"
+    worth, why = _worth(engines, engine)
+    return worth == (says == "worth building"), f"W3: {why}"
