@@ -1,7 +1,7 @@
 """The Python functions for tables of problem files, made of the schema: `python tests/schemas.py` writes them.
 
 A function for each table inside a table, a method for each table of an engine or of a problem, and a function for each
-layout. Every key of the file is an argument; `keys_from` adds to the docstring what the schema says of the key.
+layout. Every key of the file is an argument; `describe` adds to the docstring what the schema says of the key.
 """
 
 from __future__ import annotations
@@ -111,10 +111,10 @@ class Call:
 
     def __init__(
         self, name: str, summary: str, table: Entry, returns: str, body: str, *, first: str = "", method: bool = False,
-        fixed: Mapping[str, Any] | None = None, required: frozenset[str] = frozenset(), title: str = "",
+        fixed: Mapping[str, Any] | None = None, required: frozenset[str] = frozenset(), documents: bool = False,
     ) -> None:  # fmt: skip
         self.name, self.summary, self.returns, self.body, self.method = name, summary, returns, body, method
-        self.first, self.table, self.title = first, table, title
+        self.first, self.table, self.documents = first, table, documents
         self.keys = {key: entry for key, entry in table["properties"].items() if key not in (fixed or {})}
         self.required = required or frozenset(table.get("required", ()))
 
@@ -133,10 +133,8 @@ class Call:
         head = f"{indent}def {self.name}({arguments}) -> {self.returns}:"
         if len(head) > WIDTH:
             head = f"{indent}def {self.name}(\n{packed(signature, f'{indent}    ')}\n{indent}) -> {self.returns}:"
-        if self.title:
-            head = f'{indent}@keys_from("{self.title}")\n{head}'
         doc = f'{indent}    """{self.summary}'
-        if not self.title:
+        if self.documents:
             doc += f"\n\n{indent}    Parameters\n{indent}    ----------"
             for key in ([self.first] if self.first else []) + needed + others:
                 words = description(schema(), self.keys[key]).replace("\\", "\\\\")
@@ -203,7 +201,7 @@ OWN = ("Array", "Number", "Open", "Table", "Value", "Values")
 
 
 def module(doc: str, body: str, extra: Mapping[str, tuple[str, ...]]) -> str:
-    gap = "\n" if body.startswith(("@", "def", "class")) else ""
+    gap = "\n" if body.startswith(("def", "class")) else ""
     head = imports(body, STANDARD)
     own = imports(body, {**extra, "laufruhe.problem.number_types": OWN})
     own = "\n".join(sorted(own.split("\n")))
@@ -225,11 +223,9 @@ def tables_module() -> str:
         name, fixed = snake(table["title"]), fixed_of(table)
         summary = f"Return a table `{name}`. {table.get('description', '')}".rstrip()
         given = f"keys_of(locals(), {fixed})" if fixed else "keys_of(locals())"
-        calls.append(
-            Call(name, summary, table, "Table", given, first=first_of(table), fixed=fixed, title=table["title"]).text()
-        )
-    body = "\n\n".join(calls)
-    extra = {"laufruhe.python.keys": ("keys_from", "keys_of"), "laufruhe.problem.goals": ("QuantityName",)}
+        calls.append(Call(name, summary, table, "Table", given, first=first_of(table), fixed=fixed).text())
+    body = "\n\n".join([*calls, "describe(globals())\n"])
+    extra = {"laufruhe.python.keys": ("describe", "keys_of"), "laufruhe.problem.goals": ("QuantityName",)}
     return module("Tables inside the tables of a problem file, such as an unbalance of a shaft.", body, extra)
 
 
@@ -245,24 +241,18 @@ def parts_module() -> str:
             summary = f"Return the engine with {article(words) if is_list else words}. {entry.get('description', '')}"
             given = f"keys_of(locals(), {fixed})" if fixed else "keys_of(locals())"
             body = f'self._with("{key}", "{name}", {given})'
-            call = Call(
-                name,
-                summary.rstrip(),
-                table,
-                "Self",
-                body,
-                first=first_of(table),
-                method=True,
-                fixed=fixed,
-                title=table["title"],
-            )
+            call = Call(name, summary.rstrip(), table, "Self", body, first=first_of(table), method=True, fixed=fixed)
             calls.append(call.text())
     head = (
         'class EngineParts(Parts):\n    """Methods that add a table of a problem file to an engine; each returns a new '
         'engine."""\n\n'
     )
-    extra = {"laufruhe.python.keys": ("Parts", "keys_from", "keys_of")}
-    return module("Parts and settings of an engine in code.", head + "\n".join(calls), extra)
+    extra = {"laufruhe.python.keys": ("Parts", "describe", "keys_of")}
+    return module(
+        "Parts and settings of an engine in code.",
+        "\n".join([head + calls[0], *calls[1:], "\ndescribe(vars(EngineParts))\n"]),
+        extra,
+    )
 
 
 def goals_module() -> str:
@@ -279,15 +269,15 @@ def goals_module() -> str:
     calls = [
         Call(
             "minimise", replaces, objective, "Self", 'self._with_goal("objective", locals(), False)', first="minimise",
-            method=True, fixed={"within": None},
+            method=True, fixed={"within": None}, documents=True,
         ),
         Call(
             "then_minimise", follows, further, "Self", 'self._with_goal("objective", locals(), True)', first="minimise",
-            method=True,
+            method=True, documents=True,
         ),
         Call(
             "limit", "Return the problem with one more limit.", limit, "Self",
-            'self._with_goal("constraints", locals(), True)', first="limit", method=True,
+            'self._with_goal("constraints", locals(), True)', first="limit", method=True, documents=True,
         ),
     ]  # fmt: skip
     head = (
@@ -321,17 +311,21 @@ def layouts_module() -> str:
         summary, given = f"Return an engine of layout {name}. {doc}.", f'engine_of(locals(), {{"layout": "{name}"}})'
         call = Call(
             name.replace("-", "_"), summary, {"properties": keys}, "EngineDraft", given, first="cylinders",
-            required=required, title="EngineTable",
+            required=required,
         )  # fmt: skip
         calls.append(call.text())
     summary, keys = "Return an engine of the catalogue; arguments replace its numbers.", dict(engine["properties"])
     call = Call(
         "engine", summary, {"properties": keys}, "EngineDraft", "engine_of(locals(), {})", first="catalogue",
-        required=frozenset({"catalogue"}), title="EngineTable",
+        required=frozenset({"catalogue"}),
     )  # fmt: skip
     calls.append(call.text())
-    extra = {"laufruhe.python.draft": ("EngineDraft", "engine_of"), "laufruhe.python.keys": ("keys_from",)}
-    return module("Engines in code: a function for each layout, and one for the catalogue.", "\n\n".join(calls), extra)
+    extra = {"laufruhe.python.draft": ("EngineDraft", "engine_of"), "laufruhe.python.keys": ("describe",)}
+    return module(
+        "Engines in code: a function for each layout, and one for the catalogue.",
+        "\n\n".join([*calls, 'describe(globals(), "EngineTable")\n']),
+        extra,
+    )
 
 
 def texts() -> dict[Path, str]:

@@ -6,15 +6,14 @@ import inspect
 import json
 import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.resources import files
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from laufruhe.files.problem_file import SCHEMA
 from laufruhe.units import unit_of_dimension
 
-Call = TypeVar("Call", bound=Callable[..., Any])
 
 NAMES = {"how": "as"}
 """Keys that are no names in Python, by the names of their arguments."""
@@ -62,17 +61,19 @@ def _schema() -> dict[str, Any]:
     return dict(json.loads((files("laufruhe.files") / SCHEMA).read_text(encoding="utf-8")))
 
 
-def keys_from(title: str) -> Callable[[Call], Call]:
-    """Add the keys of a table of the schema to the docstring of a function that has them as arguments."""
+def describe(calls: Mapping[str, Any], title: str = "") -> None:
+    """Add the keys of tables of the schema to the docstrings of the functions of a module or class.
 
-    def add_parameters(call: Call) -> Call:
-        entries = _schema()["definitions"][title]["properties"]
-        lines = ["Parameters", "----------"]
-        for name in inspect.signature(call).parameters:
-            if name != "self":
-                words = description(_schema(), entries[NAMES.get(name, name)])
-                lines += [name, textwrap.indent(textwrap.fill(words, 112), "    ")]
-        call.__doc__ = "\n".join([inspect.cleandoc(call.__doc__ or ""), "", *lines])
-        return call
-
-    return add_parameters
+    A function has the keys of the table `title` as arguments, by default those of the table of its own name.
+    """
+    home = calls.get("__name__") or calls["__module__"]
+    for function, call in calls.items():
+        if inspect.isfunction(call) and call.__module__ == home:
+            table = title or "".join(map(str.capitalize, function.removeprefix("gas_").split("_"))) + "Table"
+            entries = _schema()["definitions"][table]["properties"]
+            lines = [inspect.cleandoc(call.__doc__ or ""), "", "Parameters", "----------"]
+            for name in inspect.signature(call).parameters:
+                if name != "self":
+                    words = description(_schema(), entries[NAMES.get(name, name)])
+                    lines += [name, textwrap.indent(textwrap.fill(words, 112), "    ")]
+            call.__doc__ = "\n".join(lines)

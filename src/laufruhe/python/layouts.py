@@ -11,10 +11,9 @@ from typing import Literal
 
 from laufruhe.problem.number_types import Table, Value, Values
 from laufruhe.python.draft import EngineDraft, engine_of
-from laufruhe.python.keys import keys_from
+from laufruhe.python.keys import describe
 
 
-@keys_from("EngineTable")
 def inline(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -36,7 +35,6 @@ def inline(
     return engine_of(locals(), {"layout": "inline"})
 
 
-@keys_from("EngineTable")
 def vee(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -60,7 +58,6 @@ def vee(
     return engine_of(locals(), {"layout": "vee"})
 
 
-@keys_from("EngineTable")
 def boxer(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -83,7 +80,6 @@ def boxer(
     return engine_of(locals(), {"layout": "boxer"})
 
 
-@keys_from("EngineTable")
 def opposed_piston(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -107,7 +103,6 @@ def opposed_piston(
     return engine_of(locals(), {"layout": "opposed-piston"})
 
 
-@keys_from("EngineTable")
 def delta(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -127,7 +122,6 @@ def delta(
     return engine_of(locals(), {"layout": "delta"})
 
 
-@keys_from("EngineTable")
 def radial(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -151,7 +145,6 @@ def radial(
     return engine_of(locals(), {"layout": "radial"})
 
 
-@keys_from("EngineTable")
 def x_engine(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -176,7 +169,6 @@ def x_engine(
     return engine_of(locals(), {"layout": "x-engine"})
 
 
-@keys_from("EngineTable")
 def parts(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "swinging-yoke"] | None = None, bore: Value | None = None,
@@ -193,7 +185,6 @@ def parts(
     return engine_of(locals(), {"layout": "parts"})
 
 
-@keys_from("EngineTable")
 def rotary(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"], rotating_mass: Value | None = None,
     big_end: Table | None = None,
@@ -212,7 +203,6 @@ def rotary(
     return engine_of(locals(), {"layout": "rotary"})
 
 
-@keys_from("EngineTable")
 def engine(
     catalogue: str, *,
     layout: Literal["inline", "vee", "boxer", "opposed-piston", "delta", "radial", "x-engine", "parts",
@@ -244,3 +234,6 @@ def engine(
 ) -> EngineDraft:
     """Return an engine of the catalogue; arguments replace its numbers."""
     return engine_of(locals(), {})
+
+
+describe(globals(), "EngineTable")

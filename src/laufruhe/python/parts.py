@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from typing import Literal, Self
 
 from laufruhe.problem.number_types import Array, Number, Table, Value, Values
-from laufruhe.python.keys import Parts, keys_from, keys_of
+from laufruhe.python.keys import Parts, describe, keys_of
 
 
 class EngineParts(Parts):
     """Methods that add a table of a problem file to an engine; each returns a new engine."""
 
-    @keys_from("UnitsTable")
     def units(
         self, *, force: str | None = None, mass: str | None = None, unbalance: str | None = None,
         length: str | None = None,
@@ -27,12 +26,10 @@ class EngineParts(Parts):
         """
         return self._with("units", "units", keys_of(locals()))
 
-    @keys_from("QuantitiesTable")
     def quantities(self, *, stroke_over_bore: Value | None = None) -> Self:
         """Return the engine with quantities. Numbers that several numbers of the file follow."""
         return self._with("quantities", "quantities", keys_of(locals()))
 
-    @keys_from("PhasingTable")
     def phasing(
         self, *, phases: int | None = None, intervals: Table | None = None, best: int | None = None,
         rank_orders_by: Sequence[Literal["roll moment", "neighbours", "longest gap"]] | None = None,
@@ -42,7 +39,6 @@ class EngineParts(Parts):
         """Return the engine with phasing. Search of open throws, firing orders and shafts."""
         return self._with("phasing", "phasing", keys_of(locals()))
 
-    @keys_from("OperatingPointTable")
     def operating_point(
         self, name: str | None = None, *, misfire: Sequence[int] | Literal["each"] | None = None,
         cut: Sequence[int] | None = None, cut_valves: Literal["closed", "open"] | None = None,
@@ -53,7 +49,6 @@ class EngineParts(Parts):
         """Return the engine with an operating point. Speeds and loads at which the engine is looked at."""
         return self._with("operating_points", "operating_point", keys_of(locals()))
 
-    @keys_from("SeiligerTable")
     def gas_seiliger(
         self, *, peak_pressure: Value, imep: Value, single_cylinders: Sequence[Table] | None = None,
         chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
@@ -64,7 +59,6 @@ class EngineParts(Parts):
         """Return the engine with gas seiliger. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_seiliger", keys_of(locals(), {'model': 'seiliger'}))
 
-    @keys_from("WiebeTable")
     def gas_wiebe(
         self, *, imep: Value, start: Value, duration: Value, single_cylinders: Sequence[Table] | None = None,
         chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
@@ -75,7 +69,6 @@ class EngineParts(Parts):
         """Return the engine with gas wiebe. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_wiebe", keys_of(locals(), {'model': 'wiebe'}))
 
-    @keys_from("TraceTable")
     def gas_trace(
         self, *, file: str, single_cylinders: Sequence[Table] | None = None, chambers: Sequence[Table] | None = None,
         sheet: str | None = None, angle_column: str | int | None = None, angle_unit: str | None = None,
@@ -88,12 +81,10 @@ class EngineParts(Parts):
         """Return the engine with gas trace. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_trace", keys_of(locals(), {'model': 'trace'}))
 
-    @keys_from("ChambersTable")
     def gas_chambers(self, *, chambers: Sequence[Table], crankcase_pressure: Value | None = None) -> Self:
         """Return the engine with gas chambers. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_chambers", keys_of(locals(), {'model': 'chambers'}))
 
-    @keys_from("FrictionTable")
     def friction(
         self, *, file: str | None = None, kind: Literal["fuel", "motoring"] | None = None,
         speed_unit: str | None = None, load_unit: str | None = None, fmep: Number | None = None,
@@ -105,7 +96,6 @@ class EngineParts(Parts):
         """
         return self._with("friction", "friction", keys_of(locals()))
 
-    @keys_from("MountsTable")
     def mounts(
         self, *, kind: Literal["rigid", "elastic"] | None = None, axes: Table | None = None,
         positions: Sequence[Values] | Array | None = None, names: Sequence[str] | None = None,
@@ -115,7 +105,6 @@ class EngineParts(Parts):
         """Return the engine with mounts. How the engine is held."""
         return self._with("mounts", "mounts", keys_of(locals()))
 
-    @keys_from("BlockTable")
     def block(
         self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None, axes: Table | None = None,
         inertia_products: Values | None = None, turning_inertia: Value | None = None,
@@ -123,7 +112,6 @@ class EngineParts(Parts):
         """Return the engine with block. The rigid body that elastic mounts carry."""
         return self._with("block", "block", keys_of(locals()))
 
-    @keys_from("LoadCaseTable")
     def load_case(
         self, name: str, *, times_weight: Values | None = None, torque: Value | None = None,
         force: Values | None = None, place: Values | None = None,
@@ -134,7 +122,6 @@ class EngineParts(Parts):
         """
         return self._with("load_cases", "load_case", keys_of(locals()))
 
-    @keys_from("MainBearingTable")
     def main_bearing(
         self, name: str | None = None, *, x: Value | None = None, beside_throws: Value | None = None,
         shaft: str | None = None, diameter: Value | None = None, width: Value | None = None,
@@ -143,7 +130,6 @@ class EngineParts(Parts):
         """Return the engine with a main bearing. Bearings of the crankshaft in the block."""
         return self._with("main_bearings", "main_bearing", keys_of(locals()))
 
-    @keys_from("LoadTorqueTable")
     def load_torque(
         self, *, file: str, sheet: str | None = None, angle_column: str | int | None = None,
         angle_unit: str | None = None, cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
@@ -156,19 +142,16 @@ class EngineParts(Parts):
         """
         return self._with("load_torque", "load_torque", keys_of(locals()))
 
-    @keys_from("FlywheelTable")
     def flywheel(
         self, *, inertia: Value | None = None, rim: Table | None = None, crankshaft_inertia: Value | None = None,
     ) -> Self:
         """Return the engine with flywheel. Parts that turn at crank speed, without pistons and rods."""
         return self._with("flywheel", "flywheel", keys_of(locals()))
 
-    @keys_from("GearedInertiaTable")
     def geared_inertia(self, name: str, *, share: Value, ratio: Number | None = None) -> Self:
         """Return the engine with a geared inertia. A second crank, or a flywheel on a shaft of its own."""
         return self._with("geared_inertias", "geared_inertia", keys_of(locals()))
 
-    @keys_from("CounterweightTable")
     def counterweight(
         self, name: str, *, shaft: str | None = None, balance_factor: Value | None = None,
         balance_fraction: Value | None = None, throws: Sequence[int] | None = None, x: Value | None = None,
@@ -179,7 +162,6 @@ class EngineParts(Parts):
         """Return the engine with a counterweight. Weights on the crankshaft."""
         return self._with("counterweights", "counterweight", keys_of(locals()))
 
-    @keys_from("BalancerShaftTable")
     def balancer_shaft(
         self, name: str, *, ratio: Number, position: Values, unbalances: Sequence[Table], optional: bool | None = None,
         shaft_mass: Value | None = None,
@@ -187,7 +169,6 @@ class EngineParts(Parts):
         """Return the engine with a balancer shaft. Shafts with weights that turn beside the crankshaft."""
         return self._with("balancer_shafts", "balancer_shaft", keys_of(locals()))
 
-    @keys_from("FidelityTable")
     def fidelity(
         self, *, kinematics: Literal["exact", "two-order", "auto"] | None = None, tolerance: Number | None = None,
         rod: Literal["rigid", "mass-only"] | None = None, gas: bool | None = None, gas_samples: int | None = None,
@@ -198,12 +179,10 @@ class EngineParts(Parts):
         """Return the engine with fidelity. Fidelity of the physics; exact by default."""
         return self._with("fidelity", "fidelity", keys_of(locals()))
 
-    @keys_from("SearchTable")
     def search(self, *, starts: int | None = None, seed: int | None = None, boxes: int | None = None) -> Self:
         """Return the engine with search. Settings of searches for problems that are not convex."""
         return self._with("search", "search", keys_of(locals()))
 
-    @keys_from("BobWeightsTable")
     def bob_weights(
         self, *, balance_factor: Number, big_end: Number | Values, bearing_shells: Number | Values | None = None,
         piston: Number | Values | None = None, pin: Number | Values | None = None, rings: Number | Values | None = None,
@@ -215,7 +194,6 @@ class EngineParts(Parts):
         """
         return self._with("bob_weights", "bob_weights", keys_of(locals()))
 
-    @keys_from("CorrectionTable")
     def correction(
         self, *, planes: Sequence[Table], density: Number, drills: Values, depth_step: Number, max_depth: Number,
         goal: Literal["fewest holes", "least residual"] | None = None,
@@ -228,7 +206,6 @@ class EngineParts(Parts):
         """Return the engine with correction. Holes and slugs that correct the unbalance of a rotor in two planes."""
         return self._with("correction", "correction", keys_of(locals()))
 
-    @keys_from("FrameTable")
     def frame(
         self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None,
         inertia_products: Values | None = None, springs: Sequence[Table] | None = None,
@@ -239,7 +216,6 @@ class EngineParts(Parts):
         """
         return self._with("frame", "frame", keys_of(locals()))
 
-    @keys_from("ReceiverTable")
     def receiver(
         self, name: str, *, unit: Literal["m/s^2", "m/s", "Pa"] | None = None, point: Values | None = None,
         on: Literal["engine", "frame"] | None = None, transfer_functions: Table | None = None,
@@ -252,7 +228,6 @@ class EngineParts(Parts):
         """
         return self._with("receivers", "receiver", keys_of(locals()))
 
-    @keys_from("TolerancesTable")
     def tolerances(
         self, *, residual_unbalance: str | None = None, rotor_mass: Number | None = None, planes: int | None = None,
         law: Literal["uniform", "normal"] | None = None,
@@ -260,7 +235,6 @@ class EngineParts(Parts):
         """Return the engine with tolerances. Tolerances of built engines that no number of the drawing has."""
         return self._with("tolerances", "tolerances", keys_of(locals()))
 
-    @keys_from("RobustTable")
     def robust(self, *, over: str | None = None, engines: int | None = None, seed: int | None = None) -> Self:
         """Return the engine with robust.
 
@@ -268,7 +242,6 @@ class EngineParts(Parts):
         """
         return self._with("robust", "robust", keys_of(locals()))
 
-    @keys_from("AssemblyTable")
     def assembly(self, *, pistons: str | None = None, rods: str | None = None, mass_unit: str | None = None) -> Self:
         """Return the engine with assembly.
 
@@ -276,7 +249,6 @@ class EngineParts(Parts):
         """
         return self._with("assembly", "assembly", keys_of(locals()))
 
-    @keys_from("RunUpTable")
     def run_up(
         self, *, up_to: Value, time: Value | None = None, shut_down_time: Value | None = None,
         operating_point: str | None = None,
@@ -284,7 +256,6 @@ class EngineParts(Parts):
         """Return the engine with run up. Run from rest to a speed and back, through resonance."""
         return self._with("run_up", "run_up", keys_of(locals()))
 
-    @keys_from("RunningGearTable")
     def running_gear(
         self, *, density: Value | None = None, elastic_modulus: Value | None = None, webs: Table | None = None,
         rod: Table | None = None, piston_pin: Table | None = None, bolts: Table | None = None,
@@ -295,7 +266,6 @@ class EngineParts(Parts):
         """
         return self._with("running_gear", "running_gear", keys_of(locals()))
 
-    @keys_from("TorsionTable")
     def torsion(
         self, *, throw_inertia: Value | Values, cylinder_damping: Value | Values | None = None,
         loss_factor: Value | None = None, shear_modulus: Value | None = None, speeds: Values | None = None,
@@ -305,10 +275,12 @@ class EngineParts(Parts):
         """Return the engine with torsion. Discs and shafts of the torsional system of the crankshaft."""
         return self._with("torsion", "torsion", keys_of(locals()))
 
-    @keys_from("CrankcaseTable")
     def crankcase(
         self, *, clearance: Value | None = None, skirt: Value | None = None, rod: Table | None = None,
         walls: Sequence[Table] | None = None, round_parts: Sequence[Table] | None = None,
     ) -> Self:
         """Return the engine with crankcase. Space in which weights turn."""
         return self._with("crankcase", "crankcase", keys_of(locals()))
+
+
+describe(vars(EngineParts))

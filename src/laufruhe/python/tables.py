@@ -11,10 +11,9 @@ from typing import Literal
 
 from laufruhe.problem.goals import QuantityName
 from laufruhe.problem.number_types import Array, Number, Table, Value, Values
-from laufruhe.python.keys import keys_from, keys_of
+from laufruhe.python.keys import describe, keys_of
 
 
-@keys_from("AbsorberTable")
 def absorber(
     name: str, *, on: str, inertia: Value, damping: Value | None = None, stiffness: Value | None = None,
     loss_factor: Value | None = None, order: Value | None = None, damping_ratio: Value | None = None,
@@ -23,13 +22,11 @@ def absorber(
     return keys_of(locals())
 
 
-@keys_from("ArmsTable")
 def arms(*, count: int, at_rim: Values, at_hub: Values, hub_diameter: Value) -> Table:
     """Return a table `arms`. Oval arms between hub and rim."""
     return keys_of(locals())
 
 
-@keys_from("AxesTable")
 def axes(
     *, crank: Values | Literal["+x", "-x", "+y", "-y", "+z", "-z"],
     up: Values | Literal["+x", "-x", "+y", "-y", "+z", "-z"], origin: Values | None = None,
@@ -41,13 +38,11 @@ def axes(
     return keys_of(locals())
 
 
-@keys_from("BigEndTable")
 def big_end(*, diameter: Value, width: Value) -> Table:
     """Return a table `big_end`. Big-end bearing of the rod on the crank pin."""
     return keys_of(locals())
 
 
-@keys_from("BodyTable")
 def body(
     *, kind: Literal["sector", "slab", "cheek"], outer_radius: Value, thickness: Value,
     inner_radius: Value | None = None, angle: Value | None = None, width: Value | None = None,
@@ -57,19 +52,16 @@ def body(
     return keys_of(locals())
 
 
-@keys_from("BoltsTable")
 def bolts(*, diameter: Value, count: int | None = None) -> Table:
     """Return a table `bolts`. The bolts of every big end."""
     return keys_of(locals())
 
 
-@keys_from("BranchDiscTable")
 def branch_disc(name: str, *, inertia: Value, shaft: Table, damping: Value | None = None) -> Table:
     """Return a table `branch_disc`. A disc of a branch."""
     return keys_of(locals())
 
 
-@keys_from("BranchTable")
 def branch(*, on: str, ratio: Number, gear_inertia: Value | None = None, discs: Sequence[Table] | None = None) -> Table:
     """Return a table `branch`.
 
@@ -78,7 +70,6 @@ def branch(*, on: str, ratio: Number, gear_inertia: Value | None = None, discs: 
     return keys_of(locals())
 
 
-@keys_from("ChamberTable")
 def chamber(
     name: str | None = None, *, end: Literal["head", "crank"], bore: Value, cylinders: Sequence[int] | None = None,
     rod: Value | None = None, steam: Table | None = None, pump: Table | None = None, trace: Table | None = None,
@@ -87,13 +78,11 @@ def chamber(
     return keys_of(locals())
 
 
-@keys_from("CoupledTable")
 def coupled(*, to: str, how: Literal["equal", "opposite", "mirrored", "mirrored opposite"]) -> Table:
     """Return a table `coupled`. Unbalance that follows another one."""
     return keys_of(locals())
 
 
-@keys_from("CrankTable")
 def crank(
     *, pieces: Sequence[Table] | None = None, diameter: Value | None = None, bore: Value | None = None,
     damping: Value | None = None, loss_factor: Value | None = None, stiffness: Value | Values | None = None,
@@ -102,7 +91,6 @@ def crank(
     return keys_of(locals())
 
 
-@keys_from("DiscTable")
 def disc(
     name: str, *, inertia: Value, shaft: Table, end: Literal["front", "rear"], damping: Value | None = None,
 ) -> Table:
@@ -110,7 +98,6 @@ def disc(
     return keys_of(locals())
 
 
-@keys_from("DynamicStiffnessTable")
 def dynamic_stiffness(
     *, file: str, axis: Literal["x", "y", "z"] | None = None, frequency_unit: str | None = None,
     stiffness_unit: str | None = None, columns: Literal["stiffness and loss", "amount and angle"] | None = None,
@@ -122,7 +109,6 @@ def dynamic_stiffness(
     return keys_of(locals())
 
 
-@keys_from("FluidTrackTable")
 def fluid_track(
     *, mass: Value, bulge_stiffness: Value, axis: Literal["x", "y", "z"] | None = None,
     chamber_stiffness: Value | None = None, damping: Value | None = None,
@@ -134,7 +120,6 @@ def fluid_track(
     return keys_of(locals())
 
 
-@keys_from("FrameSpringTable")
 def frame_spring(
     *, position: Values, stiffness: Values, loss_factor: Value | None = None, damping: Values | None = None,
 ) -> Table:
@@ -142,7 +127,6 @@ def frame_spring(
     return keys_of(locals())
 
 
-@keys_from("IntervalsTable")
 def intervals(
     *, min: Number | None = None, max: Number | None = None, largest_deviation: Number | None = None,
 ) -> Table:
@@ -150,7 +134,6 @@ def intervals(
     return keys_of(locals())
 
 
-@keys_from("MeasuredTable")
 def measured(
     *, angle: Value, unbalance: Value | complex | None = None, mass: Value | complex | None = None,
     radius: Value | None = None,
@@ -159,7 +142,6 @@ def measured(
     return keys_of(locals())
 
 
-@keys_from("MountTable")
 def mount(
     name: str | None = None, *, position: Values | None = None, relative_stiffness: Values | None = None,
     turned: Values | None = None, stiffness: Values | None = None, loss_factor: Value | None = None,
@@ -171,19 +153,16 @@ def mount(
     return keys_of(locals())
 
 
-@keys_from("PegTable")
 def peg(*, at: Value, to: Value) -> Table:
     """Return a table `peg`. Known pressure at an angle, to which a floating pressure is moved."""
     return keys_of(locals())
 
 
-@keys_from("PieceTable")
 def piece(*, length: Value, diameter: Value, bore: Value | None = None) -> Table:
     """Return a table `piece`. A round piece of a shaft."""
     return keys_of(locals())
 
 
-@keys_from("PistonPinTable")
 def piston_pin(
     *, diameter: Value, length: Value, bore: Value | None = None, in_bosses: Value | None = None,
     span: Value | None = None,
@@ -192,7 +171,6 @@ def piston_pin(
     return keys_of(locals())
 
 
-@keys_from("PlaneTable")
 def plane(
     name: str, *, measured: Table, radius: Value, x: Value | None = None, angles: Values | None = None,
     places: int | None = None, first_place: Value | None = None, allowed: Sequence[Values] | Array | None = None,
@@ -203,13 +181,11 @@ def plane(
     return keys_of(locals())
 
 
-@keys_from("PumpTable")
 def pump(*, suction: Value, delivery: Value) -> Table:
     """Return a table `pump`. A piston pump."""
     return keys_of(locals())
 
 
-@keys_from("RecordedTable")
 def recorded(
     *, file: str, sheet: str | None = None, angle_column: str | int | None = None, angle_unit: str | None = None,
     cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
@@ -220,7 +196,6 @@ def recorded(
     return keys_of(locals())
 
 
-@keys_from("RimTable")
 def rim(
     *, mean_diameter: Value, width: Value, height: Value, density: Value | None = None, whole: Value | None = None,
     arms: Table | None = None,
@@ -229,37 +204,31 @@ def rim(
     return keys_of(locals())
 
 
-@keys_from("RodSizeTable")
 def rod_size(*, width: Value, thickness: Value, big_end: Value, small_end: Value | None = None) -> Table:
     """Return a table `rod_size`. Rod as a part that weights must not hit."""
     return keys_of(locals())
 
 
-@keys_from("RodTable")
 def rod(*, mass: Value, centre_of_gravity: Value, inertia: Value) -> Table:
     """Return a table `rod`. Connecting rod as a rigid body."""
     return keys_of(locals())
 
 
-@keys_from("RoundPartTable")
 def round_part(name: str, *, position: Values, radius: Value, x: Values | None = None) -> Table:
     """Return a table `round_part`. Round part along the shafts, such as a camshaft."""
     return keys_of(locals())
 
 
-@keys_from("ShaftTable")
 def shaft(name: str, *, position: Values, ratio: Number | None = None, lead: Value | None = None) -> Table:
     """Return a table `shaft`. Crankshaft in a free list of parts."""
     return keys_of(locals())
 
 
-@keys_from("ShankTable")
 def shank(*, diameter: Value, bore: Value | None = None) -> Table:
     """Return a table `shank`. The round shank of every rod."""
     return keys_of(locals())
 
 
-@keys_from("SingleCylinderTable")
 def single_cylinder(
     *, cylinders: int | Sequence[int], bore: Value | None = None, stroke: Value | None = None,
     rod_ratio: Value | None = None, rod_length: Value | None = None, offset: Value | None = None,
@@ -272,7 +241,6 @@ def single_cylinder(
     return keys_of(locals())
 
 
-@keys_from("SingleGasTable")
 def single_gas(
     *, cylinders: int | Sequence[int], imep: Value | None = None, peak_pressure: Value | None = None,
     compression_ratio: Value | None = None,
@@ -281,7 +249,6 @@ def single_gas(
     return keys_of(locals())
 
 
-@keys_from("SliderCrankTable")
 def slider_crank(
     *, x: Value, bank_angle: Value | None = None, throw: Value | None = None, firing_angle: Value | None = None,
     shaft: str | None = None, stroke: Value | None = None, bore: Value | None = None, rod_ratio: Value | None = None,
@@ -292,13 +259,11 @@ def slider_crank(
     return keys_of(locals())
 
 
-@keys_from("SlugsTable")
 def slugs(*, density: Value, diameters: Values) -> Table:
     """Return a table `slugs`. Slugs of heavy metal, which fill holes of their diameter."""
     return keys_of(locals())
 
 
-@keys_from("SteamTable")
 def steam(
     *, admission: Value, back_pressure: Value, cut_off: Value, release: Value | None = None,
     compression: Value | None = None, lead: Value | None = None, clearance: Value | None = None,
@@ -308,13 +273,11 @@ def steam(
     return keys_of(locals())
 
 
-@keys_from("StopTable")
 def stop(*, gap: Value, stiffness: Value) -> Table:
     """Return a table `stop`. Bump stop along each of the mount's own axes; it acts in run-ups and load cases."""
     return keys_of(locals())
 
 
-@keys_from("TermTable")
 def term(
     *, quantity: QuantityName, mounts: Sequence[str] | None = None, bearings: Sequence[str] | None = None,
     cylinders: Sequence[str] | None = None, sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
@@ -327,7 +290,6 @@ def term(
     return keys_of(locals())
 
 
-@keys_from("TorsionShaftTable")
 def torsion_shaft(
     *, pieces: Sequence[Table] | None = None, diameter: Value | None = None, bore: Value | None = None,
     damping: Value | None = None, loss_factor: Value | None = None, stiffness: Value | None = None,
@@ -336,7 +298,6 @@ def torsion_shaft(
     return keys_of(locals())
 
 
-@keys_from("TransferFunctionsTable")
 def transfer_functions(
     *, x: str | None = None, y: str | None = None, z: str | None = None, sound: str | None = None,
 ) -> Table:
@@ -347,7 +308,6 @@ def transfer_functions(
     return keys_of(locals())
 
 
-@keys_from("UnbalanceTable")
 def unbalance(
     name: str | None = None, *, x: Value | None = None, unbalance: Value | complex | None = None,
     mass: Value | complex | None = None, radius: Value | None = None, angle: Value | None = None,
@@ -357,13 +317,14 @@ def unbalance(
     return keys_of(locals())
 
 
-@keys_from("WallTable")
 def wall(name: str, *, angle: Value, distance: Value) -> Table:
     """Return a table `wall`. Flat wall along the shafts, such as a sump."""
     return keys_of(locals())
 
 
-@keys_from("WebsTable")
 def webs(*, width: Value, thickness: Value) -> Table:
     """Return a table `webs`. The two webs adjacent to every pin."""
     return keys_of(locals())
+
+
+describe(globals())
