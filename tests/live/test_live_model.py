@@ -15,7 +15,7 @@ import pytest
 import ready
 from laufruhe.files.reader import load
 from laufruhe.live import live_model, page_assets
-from laufruhe.live.parts import Reference
+from laufruhe.live.model import reference_of
 from laufruhe.live.saving import file_number
 from laufruhe.live.signals import NORMS_OF_PAGE
 from laufruhe.numerics.spectrum import JUMP_OFFSET
@@ -189,13 +189,13 @@ def test_a_channel_that_nobody_named_is_not_followed(every):
     ],
 )
 def test_a_reference_is_named_by_what_was_proven_of_it(proof, name, proven):
-    found = Reference.from_proof(1.0, proof, 0.026)
-    assert (found.name, found.is_proven) == (name, proven)
+    found = reference_of(1.0, proof, 0.026)
+    assert (found["name"], found["is_proven"]) == (name, proven)
 
 
 def test_a_served_page_takes_its_reference_from_its_server(every):
     result = ready.solved("tractor-four-lanchester")
-    assert live_model(result.problem, result).reference.is_proven
+    assert live_model(result.problem, result).reference["is_proven"]
     assert live_model(result.problem, result, is_served=True).reference is None
 
 

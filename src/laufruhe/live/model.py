@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +19,14 @@ from laufruhe import units
 from laufruhe.errors import ModelError
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
-from laufruhe.live.parts import Curve, DisplayedMeasure, LiveDesign, LiveModel, Reference, Slider
+from laufruhe.live.parts import DisplayedMeasure, LiveModel, Slider, or_none
 from laufruhe.live.saving import saved_file
 from laufruhe.live.signals import NORMS_OF_PAGE, Signal, signal_of
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
+from laufruhe.present.numbers import share
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.decision import Decision, Domain, Kind, decision_vector
 from laufruhe.problem.dependence import depends, is_affine
@@ -95,7 +97,9 @@ def _filled(
     collected = _Collected(affine, kinds, result, aside)
     forces = [(places.title, places.channel) for places in places_of(result) if places.channel.depends_on_unbalances]
     block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
-    curves = tuple(Curve(title, collected.signal(Measure(channel))) for title, channel in (*forces, *block))
+    curves = tuple(
+        {"title": title, "signal": collected.signal(Measure(channel))} for title, channel in (*forces, *block)
+    )
     measures = collected.measures()
     designs = [("given", decision_vector(affine.domains))]
     if result.decisions:
@@ -107,7 +111,7 @@ def _filled(
         signals=tuple(collected.signals.values()),
         curves=curves,
         measures=measures,
-        designs=tuple(_design(name, x, slider_problem, affine.domains, collected.queries) for name, x in designs),
+        designs={name: _design(x, slider_problem, affine.domains, collected.queries) for name, x in designs},
         reference=None if is_served else _reference(result),
         without_slider=(*bare.without_slider, *collected.without_slider),
     )
@@ -202,14 +206,14 @@ def _between(domains: Sequence[Domain]) -> Array:
 
 
 def _design(
-    name: str, x: Array, slider_problem: Problem, domains: Sequence[Domain], measures: Sequence[Measure | None]
-) -> LiveDesign:
+    x: Array, slider_problem: Problem, domains: Sequence[Domain], measures: Sequence[Measure | None]
+) -> dict[str, Any]:
     evaluation = evaluate(slider_problem, slider_problem.design([domain.complex_value(x) for domain in domains]))
     values = (None if measure is None else float(evaluation.value(measure)) for measure in measures)
-    return LiveDesign(name, tuple(map(float, x)), tuple(values))
+    return {"x": x.tolist(), "measured": [*map(or_none, values)]}
 
 
-def _reference(result: Result) -> Reference | None:
+def _reference(result: Result) -> dict[str, Any] | None:
     # there is no design for comparison if another objective was bounded
     if result.problem.extras or not result.decisions:
         return None
@@ -218,8 +222,15 @@ def _reference(result: Result) -> Reference | None:
         return None
     if result.ranks:
         first = result.ranks[0]
-        return Reference.from_proof(first.minimum, first.proof, first.gap)
-    return Reference.from_proof(objective.value, certificate.kind, certificate.gap)
+        return reference_of(first.minimum, first.proof, first.gap)
+    return reference_of(objective.value, certificate.kind, certificate.gap)
+
+
+def reference_of(value: float, proof: Proof, gap: float) -> dict[str, Any]:
+    """Return a design for comparison: its objective [SI], and a name that says how it is proven."""
+    names = {Proof.GLOBAL: "the proven optimum", Proof.WITHIN_GAP: f"the best design found (gap {share(gap)})"}
+    name = names.get(proof, "the best design found (a local optimum)")
+    return {"value": value, "name": name, "is_proven": proof is Proof.GLOBAL}
 
 
 def _without_slider(problem: Problem, how: str) -> Iterator[tuple[str, str]]:

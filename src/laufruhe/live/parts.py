@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from dataclasses import asdict, dataclass, fields, is_dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,8 +15,6 @@ from numpy.typing import ArrayLike
 
 from laufruhe.live.saving import NOT_SAVED, Saved
 from laufruhe.live.signals import Signal
-from laufruhe.present.numbers import share
-from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.units import readable
 
@@ -80,49 +79,17 @@ class DisplayedMeasure:
     followed: bool = True
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A drawn signal."""
-
-    title: str
-    signal: int
-
-
-@dataclass(frozen=True)
-class LiveDesign:
-    """A decision vector with the value of every measure by the exact model; None for measures that do not move."""
-
-    name: str
-    x: tuple[float, ...]
-    measured: tuple[float | None, ...]
-
-
-@dataclass(frozen=True)
-class Reference:
-    """A design for comparison: its objective [SI] and its name."""
-
-    value: float
-    name: str
-    is_proven: bool
-
-    @classmethod
-    def from_proof(cls, value: float, proof: Proof, gap: float) -> Reference:
-        """Return a design as the reference of a live page: its objective, and words that say how it is proven."""
-        if proof is Proof.GLOBAL:
-            return cls(value, "the proven optimum", True)
-        if proof is Proof.WITHIN_GAP:
-            return cls(value, f"the best design found (gap {share(gap)})", False)
-        return cls(value, "the best design found (a local optimum)", False)
-
-
 @dataclass(frozen=True, eq=False)
 class LiveModel:
     """A problem as a live page shows it, with the names of its operating points and the turns in a cycle.
 
     Attributes
     ----------
+    curves
+        Title and index of the signal of each drawn curve.
     designs
-        Given design, decided design if different, and one between the bounds for the page's self-check.
+        Decision vector `x` and `measured` values of every measure by the exact model, None if it does not move: of the
+        given design, decided design if different, and one between the bounds for the page's self-check.
     reference
         Design for comparison; None if a server provides it.
     without_slider
@@ -138,12 +105,12 @@ class LiveModel:
     turns: int
     sliders: tuple[Slider, ...] = ()
     signals: tuple[Signal, ...] = ()
-    curves: tuple[Curve, ...] = ()
+    curves: tuple[Mapping[str, Any], ...] = ()
     measures: tuple[DisplayedMeasure, ...] = ()
-    designs: tuple[LiveDesign, ...] = ()
+    designs: Mapping[str, Any] = field(default_factory=dict)
     objective: str = ""
     unit: str = ""
-    reference: Reference | None = None
+    reference: Mapping[str, Any] | None = None
     without_slider: tuple[tuple[str, str], ...] = ()
     save: Saved = NOT_SAVED
     why_not: str = ""
@@ -171,7 +138,7 @@ class LiveModel:
     def as_json(self) -> str:
         """Return the argument of the page's `show`; safe inside an HTML element."""
         signals, data = self._packed
-        as_they_are = ("name", "title", "file", "points", "turns", "sliders", "curves", "reference", "save")
+        as_they_are = ("name", "title", "file", "points", "turns", "sliders", "curves", "designs", "reference", "save")
         plain = {
             "version": VERSION,
             # the rule of `is_met`
@@ -179,11 +146,8 @@ class LiveModel:
             **{key: getattr(self, key) for key in as_they_are},
             "signals": signals,
             "measures": [
-                {**asdict(entry), "value": _or_none(entry.value), **with_unit(entry.unit)} for entry in self.measures
+                {**asdict(entry), "value": or_none(entry.value), **with_unit(entry.unit)} for entry in self.measures
             ],
-            "designs": {
-                entry.name: {"x": entry.x, "measured": [*map(_or_none, entry.measured)]} for entry in self.designs
-            },
             "objective": {"name": self.objective, **with_unit(self.unit)},
             "unmoved": [{"name": name, "why": why} for name, why in self.without_slider],
             "whyNot": self.why_not,
@@ -192,7 +156,8 @@ class LiveModel:
         return json.dumps(plain, ensure_ascii=False, allow_nan=False, default=asdict).replace("<", "\\u003c")
 
 
-def _or_none(value: float | None) -> float | None:
+def or_none(value: float | None) -> float | None:
+    """Return the number, or None if it is not finite."""
     return None if value is None or not np.isfinite(value) else value
 
 
@@ -233,4 +198,4 @@ def pack_part(part: Any, block: PackedBlock) -> Any:
         return [pack_part(entry, block) for entry in part]
     if not is_dataclass(part):
         return part
-    return {field.name: pack_part(getattr(part, field.name), block) for field in fields(part)}
+    return {entry.name: pack_part(getattr(part, entry.name), block) for entry in fields(part)}

@@ -14,7 +14,6 @@ from typing import Any, Self
 from laufruhe.files.problem_file import SCHEMA
 from laufruhe.units import unit_of_dimension
 
-
 NAMES = {"how": "as"}
 """Keys that are no names in Python, by the names of their arguments."""
 
