@@ -129,10 +129,12 @@ class Draws(AbstractContextManager["Draws"]):
     def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
         """Write the file of a finished piece and its computing time [s]."""
         point, unfinished = self._points[fingerprint], self._folder / "unfinished"
-        about = {"case": point.case.name, "draws": point.span, "quantities": list(self._columns),
-                 "units": [column.unit for column in self._columns.values()]}  # fmt: skip
+        arrays: dict[str, Any] = {
+            VALUES: record[VALUES], "quantities": list(self._columns), "case": point.case.name, "draws": point.span,
+            "units": [column.unit for column in self._columns.values()], "fingerprint": fingerprint, "seconds": seconds,
+        }  # fmt: skip
         with unfinished.open("wb") as stream:
-            np.savez_compressed(stream, **{VALUES: record[VALUES]}, fingerprint=fingerprint, seconds=seconds, **about)
+            np.savez_compressed(stream, **arrays)
         unfinished.replace(self._folder / f"{fingerprint}.npz")
         self.seconds[fingerprint] = seconds
 
