@@ -105,8 +105,8 @@ def _draw(axes: Axes, panel: _Panel) -> None:
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(_PLAIN)
     # smaller errors are drawn here
-    least = f"under {_power(MIN_ERROR)}"
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > 1.01 * MIN_ERROR else least))
+    edge = f"under {_power(MIN_ERROR)}"
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > 1.01 * MIN_ERROR else edge))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     _name(axes, panel.names, times, errors)
