@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 from fractions import Fraction
 
 import numpy as np
@@ -13,12 +12,9 @@ from hypothesis import strategies as st
 
 from laufruhe.numerics.spectrum import (
     JUMP_OFFSET,
-    Mapped,
     Spectrum,
-    Superposition,
     common_base,
     orders_equal,
-    shared,
     spectrum_of,
     spectrum_with_kinks,
 )
@@ -170,33 +166,6 @@ class TestSpectrumOf:
         np.testing.assert_allclose((values**2).mean(axis=0), power, rtol=1e-12, atol=1e-12)
 
 
-def bent(highest: int) -> Spectrum:
-    """A signal with a kink and orders of its own."""
-    rng = np.random.default_rng(4)
-    smooth = rng.normal(size=(highest + 1, 2)) + 1j * rng.normal(size=(highest + 1, 2))
-    smooth[0] = 3.0
-    smooth[1::2] = 0.0
-    kink = spectrum_with_kinks(
-        lambda x: np.abs(np.sin(x))[:, None] * [1.0, -2.0], 96, Fraction(1, 2), np.array([0.0, math.pi])
-    )
-    assert kink.kinks is not None
-    return Spectrum(Fraction(1, 2), smooth) + kink
-
-
-@pytest.mark.parametrize("highest", [4, 30])
-def test_a_mapped_signal_is_that_of_its_coefficients(highest: int) -> None:
-    turned = np.array([[1.0, 0.5], [-0.3, 0.2], [0.0, 4.0]])
-    mapped = Mapped(bent(highest), lambda values: values @ turned.T)
-    for made in (mapped, pickle.loads(pickle.dumps(mapped))):
-        plain = Spectrum(made.base, made.coefficients, made.kinks)
-        assert made.repeat_order() <= plain.repeat_order()
-        for one, other in ((made, plain), (made.series, plain.series), (made + made, plain + plain)):
-            np.testing.assert_allclose(one.sample(48), other.sample(48), atol=1e-12)
-            np.testing.assert_allclose(one.values(ANGLES), other.values(ANGLES), atol=1e-12)
-            once = one.with_base(one.repeat_order())
-            np.testing.assert_allclose(once.sample(24), other.with_base(one.repeat_order()).sample(24), atol=1e-12)
-
-
 def test_orders_are_told_apart_to_a_thousandth() -> None:
     orders = [0.0, 0.5, 1.0 / 3.0, 1.0, 1.001]
     assert orders_equal(orders, (0.3333, 1.0)).tolist() == [False, False, True, True, False]
@@ -218,45 +187,3 @@ def test_a_step_on_a_jump_is_read_behind_it_wherever_the_signal_was_moved(steps:
         assert there.sample(steps, JUMP_OFFSET) == pytest.approx(
             np.roll(saw.sample(steps, JUMP_OFFSET), moved), abs=1e-6
         )
-
-
-class TestSuperposition:
-    """A weighted sum of signals has the samples of the signal that it is added up to."""
-
-    @staticmethod
-    def parts() -> tuple[Spectrum, Spectrum]:
-        random = np.random.default_rng(3)
-        coefficients = random.normal(size=(80, 3)) + 1j * random.normal(size=(80, 3))
-        coefficients[np.arange(80) % 4 != 0] = 0.0
-        coefficients[:, 1] = 0.0
-        kinked = spectrum_with_kinks(
-            lambda angles: np.abs(np.sin(angles))[:, None] * [0.0, 1.0, 2.0], 1440, Fraction(1, 2),
-            np.array([0.0, math.pi, 2 * math.pi, 3 * math.pi]),
-        )  # fmt: skip
-        return Spectrum(Fraction(1, 2), coefficients), kinked
-
-    @pytest.mark.parametrize("offset", [0.0, 1e-3])
-    def test_samples(self, offset: float) -> None:
-        smooth, kinked = self.parts()
-        total = smooth.mapped(lambda values: 3.0 * values) + kinked
-        angles = 4.0 * math.pi * np.arange(720) / 720
-        for _ in range(2):
-            sampled = Superposition((3.0, shared(smooth)), (1.0, shared(kinked))).sample(720, offset)
-            assert kinked.kinks is not None
-            steps = total.smooth.values(angles) + kinked.kinks.values(angles + offset, kinked.period)
-            assert sampled == pytest.approx(steps, abs=1e-11)
-
-    def test_derived_signals(self) -> None:
-        smooth, kinked = self.parts()
-        total = smooth.mapped(lambda values: 3.0 * values) + kinked
-        parts = Superposition((3.0, shared(smooth)), (1.0, shared(kinked)))
-        assert parts.step == total.step
-        assert list(parts.components) == list(total.components)
-        for change in (lambda s: s.series, lambda s: s.without_mean, lambda s: s.with_base(Fraction(2))):
-            assert change(parts).sample(360) == pytest.approx(change(total).sample(360), abs=1e-11)
-            assert change(parts).coefficients == pytest.approx(change(total).coefficients, abs=1e-13)
-
-    def test_cached_samples_cannot_be_changed(self) -> None:
-        values = shared(self.parts()[0]).sample(96)
-        with pytest.raises(ValueError, match="read-only"):
-            values[0] = 1.0

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, lru_cache, partial, reduce
+from functools import cached_property, lru_cache, reduce
 from math import gcd, lcm
-from operator import add
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,13 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from laufruhe.numerics.exact_angles import Turn, phasors
 from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, join_kinks, kink_nodes
 
-S = TypeVar("S")
 MAX_SIGNAL_KINKS = 24
 """Largest number of kinks of one signal that are kept in closed form; its orders contain all others."""
 JUMP_OFFSET = 1e-3 * SAME_ANGLE
 """Angle behind a jump at which samples are taken [rad]: above its rounding error, without effect on smooth parts."""
-MAX_WAVES = 9
-"""Largest number of coefficients of a signal that is sampled by a matrix product in place of a transform."""
 MAX_ORDER_DENOMINATOR = 1000
 PER_ORDER = 1000
 """Steps in one order: orders that round to the same thousandth of crank speed are equal."""
@@ -137,28 +133,9 @@ class Spectrum:
         evaluated later than each step by `offset` [rad]. With `JUMP_OFFSET` all terms of a sum take the same side of a
         jump that lies on a step; with zero, rounding decides.
         """
-        if len(self.coefficients) > MAX_WAVES and self.step > 1 and samples % self.step == 0:
-            return _repeated(self.with_base(self.base * self.step).sample(samples // self.step, offset), self.step)
         if self.kinks is not None:
             angles = self.period * np.arange(samples) / samples + offset
             return self.smooth.sample(samples) + self.kinks.values(angles, self.period)
-        if len(self.coefficients) <= MAX_WAVES:
-            # a product with few waves takes less time than a transform
-            flat = self.coefficients.reshape(len(self.coefficients), -1)
-            values = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
-            return np.asarray(values.reshape(samples, *self.coefficients.shape[1:]))
-        used = self.components
-        if self.coefficients.ndim == 2 and not used.all():
-            values = np.zeros((*self.coefficients.shape[:0:-1], samples)).T
-            if used.any():
-                values[:, used] = Spectrum(self.base, self.coefficients[:, used]).sample(samples)
-            return values
-        if len(self.coefficients) <= samples // 2 + 1:
-            # no order is over half the number of samples, so none is folded
-            half = np.asarray(0.5 * self.coefficients, dtype=complex)
-            # orders that are their own mirror image count once
-            half[:: max(samples // 2, 1) if samples % 2 == 0 else samples] *= 2.0
-            return _transformed(half, samples)
         folded = np.zeros((samples, *self.coefficients.shape[1:]), dtype=complex)
         for start in range(0, len(self.coefficients), samples):
             block = self.coefficients[start : start + samples]
@@ -166,7 +143,7 @@ class Spectrum:
         # half of the folded orders determine a real signal
         first = samples // 2 + 1
         half = folded[:first] + folded[-np.arange(first) % samples].conj()
-        return _transformed(np.asarray(0.5 * half, dtype=complex), samples)
+        return np.asarray(np.fft.irfft(0.5 * half, samples, axis=0, norm="forward"))
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the signal at crank angles [rad], shape (len(angles), ...)."""
@@ -254,198 +231,6 @@ class Spectrum:
             total[len(b.coefficients) :] += beyond[len(b.coefficients) :]
         total[: len(b.coefficients)] += b.coefficients
         return Spectrum(a.base, total, join_kinks([a.kinks, b.kinks]))
-
-
-class Mapped(Spectrum):
-    """Signal as a real linear map of a source with fewer components; the map is applied when values are needed.
-
-    Attributes
-    ----------
-    source, linear
-        Source signal, and the map as a function of arrays (n, ...).
-    """
-
-    source: Spectrum
-    linear: Callable[[NDArray[Any]], NDArray[Any]]
-
-    def __init__(self, source: Spectrum, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> None:
-        vars(self).update(base=source.base, source=source, linear=linear)
-
-    @cached_property
-    def _resolved(self) -> Spectrum:
-        return self.source.mapped(self.linear)
-
-    @property
-    def coefficients(self) -> NDArray[np.complex128]:
-        """Coefficients of the source, mapped."""
-        return self._resolved.coefficients
-
-    @property
-    def kinks(self) -> SignalKinks | None:
-        """Kinks of the source, mapped."""
-        return self._resolved.kinks
-
-    @cached_property
-    def components(self) -> NDArray[np.bool_]:
-        """Mask of the components that the map makes of those of the source, shape (...)."""
-        used = self.source.components
-        units = np.eye(used.size)[used.ravel()].reshape(-1, *used.shape)
-        return np.asarray(self.linear(units).any(axis=0))
-
-    @property
-    def step(self) -> int:
-        """Greatest common divisor of the indices of nonzero coefficients of the source."""
-        return self.source.step
-
-    @property
-    def series(self) -> Spectrum:
-        """Signal of the listed orders alone, without kinks."""
-        return Mapped(self.source.series, self.linear)
-
-    @property
-    def without_mean(self) -> Spectrum:
-        """Signal less its mean over the period."""
-        return Mapped(self.source.without_mean, self.linear)
-
-    def with_base(self, base: Fraction) -> Spectrum:
-        """Return the same signal with another base order."""
-        return Mapped(self.source.with_base(base), self.linear)
-
-    def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
-        """Return samples of the source, mapped."""
-        return self.linear(self.source.sample(samples, offset))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Spectrum, (self.base, self.coefficients, self.kinks)
-
-
-@dataclass(frozen=True, eq=False)
-class Shared(Spectrum):
-    """Signal that many designs contain: its samples, and the signals that follow from it, are cached."""
-
-    _cached: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
-
-    @property
-    def series(self) -> Spectrum:
-        """Signal of the listed orders alone, without kinks."""
-        return self._once("series", lambda: shared(Spectrum(self.base, self.coefficients)))
-
-    @property
-    def without_mean(self) -> Spectrum:
-        """Signal less its mean over the period."""
-        return self._once("without mean", lambda: shared(super(Shared, self).without_mean))
-
-    def with_base(self, base: Fraction) -> Spectrum:
-        """Return the same signal with another base order."""
-        return self._once((base.numerator, base.denominator), lambda: shared(super(Shared, self).with_base(base)))
-
-    def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
-        """Return samples over one period, which nobody may change."""
-        values = self._once((samples, offset), lambda: super(Shared, self).sample(samples, offset))
-        values.setflags(write=False)
-        return values
-
-    def _once(self, key: Hashable, make: Callable[[], S]) -> S:
-        if key not in self._cached:
-            self._cached[key] = make()
-        return cast(S, self._cached[key])
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Shared, (self.base, self.coefficients, self.kinks)
-
-
-def shared(signal: Spectrum) -> Shared:
-    """Return the signal with a cache for its samples."""
-    return signal if isinstance(signal, Shared) else Shared(signal.base, signal.coefficients, signal.kinks)
-
-
-class Superposition(Spectrum):
-    """Weighted sum of signals with one base order, each of which is sampled in its own period.
-
-    Attributes
-    ----------
-    parts
-        Pairs (factor, signal).
-    """
-
-    parts: tuple[tuple[float, Spectrum], ...]
-
-    def __init__(self, *parts: tuple[float, Spectrum]) -> None:
-        vars(self).update(base=parts[0][1].base, parts=parts)
-
-    @cached_property
-    def _total(self) -> Spectrum:
-        return reduce(add, (signal.mapped(partial(np.multiply, factor)) for factor, signal in self.parts))
-
-    @property
-    def coefficients(self) -> NDArray[np.complex128]:
-        """Sum of the coefficients of the parts."""
-        return self._total.coefficients
-
-    @property
-    def kinks(self) -> SignalKinks | None:
-        """Kinks of the parts."""
-        return self._total.kinks
-
-    @cached_property
-    def components(self) -> NDArray[np.bool_]:
-        """Mask of the components that have a nonzero coefficient in any part."""
-        return reduce(np.logical_or, (signal.components for _, signal in self.parts))
-
-    @cached_property
-    def step(self) -> int:
-        """Greatest common divisor of the indices of nonzero coefficients of the parts."""
-        return gcd(*(signal.step for _, signal in self.parts))
-
-    @property
-    def series(self) -> Spectrum:
-        """Signal of the listed orders alone, without kinks."""
-        return self._of_parts(lambda signal: signal.series)
-
-    @property
-    def without_mean(self) -> Spectrum:
-        """Signal less its mean over the period."""
-        return self._of_parts(lambda signal: signal.without_mean)
-
-    def with_base(self, base: Fraction) -> Spectrum:
-        """Return the same signal with another base order, whose period must be a period of every part."""
-        return self._of_parts(lambda signal: signal.with_base(base))
-
-    def _of_parts(self, change: Callable[[Spectrum], Spectrum]) -> Superposition:
-        return Superposition(*((factor, change(signal)) for factor, signal in self.parts))
-
-    def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
-        """Return the weighted sum of the samples of the parts."""
-        (factor, first), *others = self.parts
-        total = factor * first.sample(samples, offset)
-        for factor, signal in others:
-            total += factor * signal.sample(samples, offset)
-        return total
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Spectrum, (self.base, self.coefficients, self.kinks)
-
-
-@lru_cache(maxsize=32)
-def _waves(count: int, samples: int) -> NDArray[np.float64]:
-    steps = np.outer(np.arange(samples), np.arange(count)) % samples
-    waves = np.exp(2j * math.pi * np.arange(samples) / samples)[steps]
-    return np.concatenate([waves.real, -waves.imag], axis=1)
-
-
-def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float64]:
-    values = np.empty((samples, *half.shape[1:]))
-    if half.ndim > 1:
-        values = np.empty((half.shape[1], samples, *half.shape[2:])).swapaxes(0, 1)
-    np.fft.irfft(half, samples, axis=0, norm="forward", out=values)
-    return values
-
-
-def _repeated(block: NDArray[np.float64], times: int) -> NDArray[np.float64]:
-    # memory holds component by component, as transforms write it
-    columns = block.T[..., None, :]
-    repeated = np.broadcast_to(columns, (*columns.shape[:-2], times, columns.shape[-1]))
-    return np.asarray(repeated.reshape(*columns.shape[:-2], -1).T)
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:

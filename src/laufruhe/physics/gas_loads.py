@@ -7,16 +7,14 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, reduce
 from operator import add
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.machine.chambers import cylinder_gas
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.exact_angles import Turn, as_turn, star_orders
-from laufruhe.numerics.spectrum import Mapped, Spectrum, shared, spectrum_with_kinks
+from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
 from laufruhe.physics.rigid_body import ROLL
@@ -27,19 +25,15 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
     return _gas_loads(engine.cycle, engine.slider_cranks, gas, fidelity)
 
 
-def _as_wrench(moment: NDArray[Any]) -> NDArray[Any]:
-    return np.asarray(moment[:, None] * ROLL)
-
-
 @lru_cache(maxsize=64)
-def _gas_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], gas: GasModel, fidelity: Fidelity) -> Mapped:
+def _gas_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], gas: GasModel, fidelity: Fidelity) -> Spectrum:
     # equal mechanisms differ only in their firing angles
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in parts:
         alike[alike_under(gas, part), part.shaft.ratio].append(part)
     stars = (_star(gas_coefficients(gas, star[0], cycle, fidelity), cycle, star) for star in alike.values())
     total = Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
-    return Mapped(shared(reduce(add, stars, total)), _as_wrench)
+    return reduce(add, stars, total).mapped(lambda moment: moment[:, None] * ROLL)
 
 
 def forget_gas() -> None:

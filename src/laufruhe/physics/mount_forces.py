@@ -15,7 +15,7 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import lengths
-from laufruhe.numerics.spectrum import Mapped, Spectrum
+from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.rigid_body import WRENCH, point_motion
 
 FREE_STRETCH = 1e-10
@@ -43,7 +43,7 @@ class RigidMounting:
     def forces(self, wrench: Spectrum, speed: float = 0.0) -> Spectrum:  # noqa: ARG002
         """Return the mount forces by order, shape (n, mounts, 3) [N]; equal at every speed."""
         self.check_carried(wrench)
-        return Mapped(wrench, self._forces_of)
+        return wrench.mapped(self._forces_of)
 
     def _forces_of(self, loads: NDArray[Any]) -> NDArray[Any]:
         # memory holds mount by mount, as norms read their rows

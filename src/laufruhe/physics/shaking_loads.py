@@ -17,7 +17,7 @@ import numpy as np
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import cancelling_sums
-from laufruhe.numerics.spectrum import Shared, Spectrum, Superposition, shared
+from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import forget_gas, gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
@@ -43,18 +43,17 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     if fidelity.has_uneven_speed:
         return uneven_loads(engine, point, fidelity)
     gas, cycle, square = fidelity.gas_of(point), engine.cycle, point.speed**2
-    turning = rotor_loads((*engine.pins, *engine.rotors), point.speed, cycle)
-    parts = [(square, _moving_loads(cycle, engine.slider_cranks, fidelity)), (1.0, turning)]
+    total = _moving_loads(cycle, engine.slider_cranks, fidelity).mapped(lambda loads: square * loads)
+    total += rotor_loads((*engine.pins, *engine.rotors), point.speed, cycle)
     if gas is not None:
-        parts.append((1.0, fidelity.truncated(gas_loads(engine, gas, fidelity))))
-    total = Superposition(*parts)
+        total += fidelity.truncated(gas_loads(engine, gas, fidelity))
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 
 @lru_cache(maxsize=64)
-def _moving_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], fidelity: Fidelity) -> Shared:
+def _moving_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], fidelity: Fidelity) -> Spectrum:
     # pistons and rods at unit speed
-    return shared(fidelity.truncated(star_loads(cycle, parts, 1.0, lambda part: chain(*effects_of(part, fidelity)))))
+    return fidelity.truncated(star_loads(cycle, parts, 1.0, lambda part: chain(*effects_of(part, fidelity))))
 
 
 def forget() -> None:
