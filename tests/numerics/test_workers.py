@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -19,8 +18,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import tables_of
 from laufruhe.numerics.budget import limit_time, seconds_left
 from laufruhe.numerics.cluster import cluster
-from laufruhe.numerics.cores import ONE_THREAD
-from laufruhe.numerics.processes import Processes, WorkerDied, fork_map
+from laufruhe.numerics.processes import Processes, WorkerDied
 from laufruhe.numerics.workers import (
     SERIAL,
     SerialExecutor,
@@ -30,7 +28,6 @@ from laufruhe.numerics.workers import (
     executor_for,
     unordered_map,
     worker_count,
-    worker_pool,
     working_on,
 )
 
@@ -109,111 +106,6 @@ def test_who_works_may_be_asked_while_workers_begin(monkeypatch: pytest.MonkeyPa
         sys.setswitchinterval(before)
 
 
-COPIED = """
-import os, signal, sys, tomllib
-from laufruhe.numerics.processes import ForkedWorker, Processes, WorkerDied
-
-tomllib.known = "of this process alone"
-signal.signal(signal.SIGINT, lambda *_: None)
-with Processes(1, [ForkedWorker()]) as pool:
-    (copy,) = pool.pids
-    assert pool.submit(os.getpid).result() == copy == pool.submit(os.getsid, 0).result() != os.getpid()
-    assert pool.submit(eval, "__import__('tomllib').known").result() == tomllib.known
-    assert pool.submit(eval, "__import__('signal').getsignal(2).name").result() == "SIG_DFL"
-    assert not ForkedWorker.is_possible()
-    try:
-        pool.submit(divmod, 1, 0).result()
-    except ZeroDivisionError:
-        os.kill(copy, signal.SIGKILL)
-    try:
-        pool.submit(abs, -1).result()
-    except WorkerDied:
-        assert pool.submit(os.getpid).result() not in (copy, os.getpid())
-with Processes(1, [ForkedWorker()]) as pool:
-    (copy,) = pool.pids
-    pool.submit(abs, -1)
-assert ForkedWorker.is_possible()
-try:
-    os.kill(copy, 0)
-except ProcessLookupError:
-    print("done")
-"""
-THREADS = Path("/proc/self/task")
-SEVERAL = """
-import os, sys
-from laufruhe.numerics import workers
-from laufruhe.numerics.processes import ForkedWorker
-from laufruhe.numerics.progress import progress_listener, report_progress
-
-workers.processors = lambda: 3
-sys.known = os.getpid()
-with workers.Processes(3, ForkedWorker.several(3)) as unasked:
-    assert len(unasked.pids) == 3
-with progress_listener(lambda step: print(step, file=sys.stderr)), workers.worker_pool(abs):
-    own = workers.current_executor()
-    pids = own.pids
-    assert len(pids) == 3
-    assert own.submit(eval, "__import__('sys').known").result() == os.getpid() != own.submit(os.getpid).result()
-    own.submit(report_progress, "nobody hears it").result()
-    assert not ForkedWorker.several(2)
-try:
-    os.wait()
-except ChildProcessError:
-    print("done")
-"""
-MEANWHILE = """
-import os, signal, time
-from laufruhe.numerics import processes
-
-processes.processors = lambda: 2
-with processes.run_concurrently(os.getpid, pays=True) as answer:
-    assert answer() != os.getpid()
-with processes.run_concurrently(os.getpid, pays=False) as answer:
-    assert answer() == os.getpid()
-here = os.getpid()
-with processes.run_concurrently(lambda: os.getpid() == here or os._exit(3), pays=True) as answer:
-    assert answer()
-began = time.monotonic()
-try:
-    with processes.run_concurrently(lambda: time.sleep(600), pays=True):
-        raise ZeroDivisionError
-except ZeroDivisionError:
-    assert time.monotonic() - began < 300.0
-try:
-    os.wait()
-except ChildProcessError:
-    print("done")
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system copies no process")
-@pytest.mark.parametrize(
-    "program",
-    [COPIED, MEANWHILE, pytest.param(SEVERAL, marks=pytest.mark.skipif(not THREADS.is_dir(), reason="told by Linux"))],
-    ids=["served", "once", "several"],
-)
-def test_copies_of_a_process_have_all_that_it_has_and_end_with_it(program: str) -> None:
-    told = subprocess.run(
-        [sys.executable, "-W", "error", "-c", program],
-        capture_output=True, text=True, check=False, env={**os.environ, **ONE_THREAD},
-    )  # fmt: skip
-    assert (told.stdout, told.stderr) == ("done\n", "")
-
-
-@pytest.mark.slow
-def test_twins_of_a_process_share_its_work_and_a_dead_one_costs_no_answer() -> None:
-    with Processes(1) as pool:
-        known = {"fork_map": fork_map, "pid": os.getpid, "end": os._exit, "own": pool.submit(os.getpid).result()}
-        found = pool.submit(eval, "fork_map(lambda k: (k, pid()), 3)", known).result()
-        assert [k for k, _ in found] == [0, 1, 2]
-        assert len({pid for _, pid in found}) == 3
-        assert pool.submit(eval, "fork_map(lambda k: k if pid() == own else end(3), 3)", known).result() == [0, 1, 2]
-        with pytest.raises(ZeroDivisionError):
-            pool.submit(eval, "fork_map(lambda k: 1 / (2 - k), 3)", known).result()
-        assert len(pool.pids) == 1
-
-
 @pytest.mark.slow
 def test_a_worker_that_is_killed_costs_no_answer() -> None:
     with Processes(2) as pool, closing(unordered_map(time.sleep, [0.05] * 30, pool)) as found:
@@ -284,30 +176,6 @@ def test_at_the_time_limit_patience_waits_for_what_was_begun() -> None:
             list(unordered_map(time.sleep, pieces, pool))
         begun = list(unordered_map(time.sleep, pieces, pool, patient=True))
     assert 1 <= len(begun) < 50
-
-
-@pytest.mark.slow
-def test_processes_at_hand_end_with_the_searches(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also in the middle of a call, which nobody waits for."""
-    for room in ("workers", "processes"):
-        monkeypatch.setattr(f"laufruhe.numerics.{room}.processors", lambda: 2)
-    with worker_pool(abs):
-        own = current_executor()
-        assert isinstance(own, Processes)
-        begun = own.submit(time.sleep, 600)
-        assert own.submit(abs, -1).result() == 1
-        pids = own.pids
-        assert pids
-        with worker_pool(abs):
-            assert current_executor() is own
-    assert current_executor() is None
-    assert isinstance(begun.exception(), WorkerDied)
-    for pid in pids:
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
-    monkeypatch.setattr("laufruhe.numerics.workers.processors", lambda: 1)
-    with worker_pool(abs):
-        assert current_executor() is None
 
 
 def test_a_worker_starts_no_workers() -> None:

@@ -34,8 +34,7 @@ WHOLE = {"crank_stars", "decisions", "limits", "places", "modes", "orders"}
 
 
 def write_all(result: Result, folder: Path) -> None:
-    with write_tables(result, folder) as written:
-        written()
+    write_tables(result, folder)
 
 
 @pytest.fixture(scope="module")

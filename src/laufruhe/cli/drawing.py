@@ -8,19 +8,16 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from laufruhe.cli.screen import Ask, loudness, speak
 from laufruhe.numerics.cores import processors
-from laufruhe.numerics.processes import ForkedWorker, Processes, call_by_name
+from laufruhe.numerics.processes import Processes, call_by_name
 
 if TYPE_CHECKING:
     from laufruhe.solvers.result import Result
 
-MAX_VIEWS = 3
-"""Largest number of processes that draw the pictures of a result."""
 SELDOM = 200_000
 """Number of new objects after which a process collects garbage; drawing makes many objects and little garbage."""
 
@@ -29,12 +26,7 @@ SELDOM = 200_000
 def artist(kinds: Sequence[str]) -> Iterator[Ask]:
     """Yield the function that requests pictures of these kinds: from another process, or from this one on one core."""
     is_other = bool(kinds) and processors() > 1
-    copies: tuple[ForkedWorker, ...] = ()
-    if is_other and ForkedWorker.is_possible():
-        # a fork has imported the libraries that solving and drawing share
-        import_module("laufruhe.solvers.conclusion")
-        copies = (ForkedWorker(),)
-    with Processes(1, copies) as workers:
+    with Processes(1) as workers:
         if is_other:
             workers.submit(gc.set_threshold, SELDOM)
             workers.submit(speak, loudness())
@@ -80,7 +72,7 @@ def drawing(ask: Ask, result: Result, folder: Path, kinds: Sequence[str]) -> Cal
     if problem.phasing is not None:
         problem = replace(problem, phasing=replace(problem.phasing, layout=_no_design, problem_of=_no_design))
     drawn = replace(result, problem=problem, error=float)
-    return ask("laufruhe.plots:draw_in_shares", drawn, folder, kinds, min(MAX_VIEWS, processors() - 1))
+    return ask("laufruhe.plots:draw_and_show", drawn, folder, kinds)
 
 
 def _no_design(*_: Any) -> NoReturn:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 
@@ -29,25 +28,22 @@ def write_results(
     `wait_for_pictures` returns the pictures as SVG, by name.
     """
     say("writing tables")
-    with ExitStack() as stack:
-        with timed(result.timing, "tables"):
-            tables = stack.enter_context(write_tables(result, stage))
-        page_model = live_model(result.problem, result)
-        with shown_in(dict(result.problem.shown_units)):
-            document = result_document(result, list(PICTURES), request.command)
-        if request.kinds:
-            say("drawing")
-        with timed(result.timing, "plots"):
-            # imports of the page and the screen run while pictures are drawn
-            template()
-            if not is_quiet():
-                import_module("laufruhe.report.screen")
-            pictures = wait_for_pictures()
-        document = document.showing(pictures)
-        files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
-        files.write(stage / files.PAGE, as_html(document, pictures, page_model))
-        with timed(result.timing, "tables"):
-            tables()
+    with timed(result.timing, "tables"):
+        write_tables(result, stage)
+    page_model = live_model(result.problem, result)
+    with shown_in(dict(result.problem.shown_units)):
+        document = result_document(result, list(PICTURES), request.command)
+    if request.kinds:
+        say("drawing")
+    with timed(result.timing, "plots"):
+        # imports of the page and the screen run while pictures are drawn
+        template()
+        if not is_quiet():
+            import_module("laufruhe.report.screen")
+        pictures = wait_for_pictures()
+    document = document.showing(pictures)
+    files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
+    files.write(stage / files.PAGE, as_html(document, pictures, page_model))
     text = as_json(result, request.series)
     for place in filter(None, (stage / files.RESULT, copy)):
         files.write(place, text)

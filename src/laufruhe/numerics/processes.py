@@ -1,34 +1,31 @@
-"""Executor on processes of this machine: new Python interpreters, or forked copies of this process.
+"""Executor on processes of this machine: new Python interpreters that do not import the caller's main module.
 
-It never forks a process with threads and does not import the caller's main module, so it works from any script,
-notebook or test. If a process dies, its current call fails with `WorkerDied`, and the next call starts a new process.
+So it works from any script, notebook or test. If a process dies, its current call fails with `WorkerDied`, and the next
+call starts a new process.
 """
 
 from __future__ import annotations
 
 import os
 import pickle
-import signal
 import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
-from contextvars import Context
-from functools import partial
+from contextlib import suppress
 from pkgutil import resolve_name
 from queue import SimpleQueue
 from types import TracebackType
-from typing import IO, Any, NoReturn, ParamSpec, TypeAlias, TypeVar
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.cores import ONE_THREAD, end_with_parent, processors
 
 P = ParamSpec("P")
 T = TypeVar("T")
-_SERVES = False
+_Child: TypeAlias = subprocess.Popen[bytes]
 _PROGRAM = "from laufruhe.numerics.processes import serve; serve({})"
 
 
@@ -37,159 +34,21 @@ def call_by_name(name: str, *args: Any) -> Any:
     return resolve_name(name)(*args)
 
 
-def _fork(child: Callable[[], object], detached: bool = False) -> int:
-    """Start a forked copy of this process that runs `child` and ends; return its process number.
-
-    Signals are blocked during the fork, so that each reaches the right process. A detached copy has its own session
-    and the default signal handlers.
-    """
-    parent, blocked = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
-    pid = os.fork()
-    if pid == 0:
-        try:
-            if detached:
-                os.setsid()
-                for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-                    signal.signal(number, signal.SIG_DFL)
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-            end_with_parent(parent)
-            child()
-        finally:
-            os._exit(0)
-    signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-    return pid
-
-
-@contextmanager
-def run_concurrently(work: Callable[[], T], pays: bool = True) -> Iterator[Callable[[], T]]:
-    """Run `work` in a forked copy of this process, and yield a function that waits for its result.
-
-    If this process cannot be forked, `work` runs here before the block. If the copy dies, it runs here when the result
-    is requested.
-
-    Parameters
-    ----------
-    work
-        Function without arguments; its result must be picklable.
-    pays
-        True if the work takes longer than a fork, which takes some milliseconds.
-    """
-    # the listener thread of a worker holds no lock that a copy needs
-    if not (pays and processors() > 1 and hasattr(os, "fork") and (_SERVES or ForkedWorker.is_possible())):
-        done = work()
-        yield lambda: done
-        return
-    read, write = os.pipe()
-
-    def child() -> None:
-        with os.fdopen(write, "wb") as stream:
-            pickle.dump(work(), stream)
-
-    pid = _fork(child)
-    os.close(write)
-
-    def answer() -> T:
-        try:
-            received: T = pickle.load(answers)
-        except (EOFError, pickle.UnpicklingError):
-            return work()
-        return received
-
-    try:
-        with os.fdopen(read, "rb") as answers:
-            yield answer
-    except BaseException:
-        os.kill(pid, signal.SIGKILL)
-        raise
-    finally:
-        os.waitpid(pid, 0)
-
-
-def fork_map(work: Callable[[int], T], count: int) -> list[T]:
-    """Return work(0) ... work(count - 1); in a worker process, forked copies compute all but the first."""
-    with ExitStack() as stack:
-        pending = [stack.enter_context(run_concurrently(partial(work, k), _SERVES)) for k in range(1, count)]
-        return [work(0), *(answer() for answer in pending)]
-
-
 class WorkerDied(BrokenExecutor):
     """Death of the process of a call before its result."""
-
-
-class ForkedWorker:
-    """Forked copy of this process that runs calls, with all modules of this process imported.
-
-    Only a process with one thread can be forked: in the copy, locks of other threads would never be released.
-    """
-
-    def __init__(self) -> None:
-        calls, self_calls = os.pipe()
-        self_answers, answers = os.pipe()
-        parent = os.getpid()
-
-        def child() -> None:
-            os.close(self_calls)
-            os.close(self_answers)
-            # a new context, without the progress listener and executor of this process
-            Context().run(_serve, parent, os.fdopen(calls, "rb"), os.fdopen(answers, "wb"))
-
-        self.pid = _fork(child, detached=True)
-        os.close(calls)
-        os.close(answers)
-        self.stdin: IO[bytes] = os.fdopen(self_calls, "wb")
-        self.stdout: IO[bytes] = os.fdopen(self_answers, "rb")
-        self._is_over = False
-
-    @staticmethod
-    def is_possible() -> bool:
-        """Return True if this process can be forked."""
-        return hasattr(os, "fork") and threading.active_count() == 1
-
-    @classmethod
-    def several(cls, count: int) -> tuple[ForkedWorker, ...]:
-        """Return `count` forked copies of this process; none if it, or one of its libraries, may have threads."""
-        try:
-            threads = len(os.listdir("/proc/self/task"))
-        except OSError:
-            return ()
-        return tuple(cls() for _ in range(count if threads == 1 and cls.is_possible() else 0))
-
-    def kill(self) -> None:
-        """Kill the process."""
-        # another thread may have waited for it
-        with suppress(ProcessLookupError):
-            if not self._is_over:
-                os.kill(self.pid, signal.SIGKILL)
-
-    def wait(self) -> None:
-        """Wait until the process has ended."""
-        if not self._is_over:
-            self._is_over = True
-            os.waitpid(self.pid, 0)
-
-
-_Child: TypeAlias = subprocess.Popen[bytes] | ForkedWorker
 
 
 class Processes(ThreadPoolExecutor):
     """Executor on up to `count` processes, which start with the first calls and end with the executor.
 
     A thread for each process passes calls to it. Each process uses one thread for linear algebra and does not receive
-    Ctrl-C; the owner of the executor ends them.
-
-    Parameters
-    ----------
-    count
-        Largest number of processes; by default the number of processors.
-    first
-        Existing processes to use first, at most `count`.
+    Ctrl-C; the owner of the executor ends them. By default there is one for each processor.
     """
 
-    def __init__(self, count: int | None = None, first: Sequence[ForkedWorker] = ()) -> None:
+    def __init__(self, count: int | None = None) -> None:
         self.count = count if count is not None else processors()
         super().__init__(self.count)
-        self._first = list(first)
-        self._children: set[_Child] = set(first)
+        self._children: set[_Child] = set()
         self._of_thread = threading.local()
         self._lock = threading.Lock()
         self._is_over = False
@@ -244,9 +103,6 @@ class Processes(ThreadPoolExecutor):
         raise answer
 
     def _start(self) -> _Child:
-        with self._lock:
-            if self._first:
-                return self._first.pop()
         path = os.pathsep.join(p for p in sys.path if p)
         child = subprocess.Popen(
             [sys.executable, "-c", _PROGRAM.format(os.getpid())],
@@ -284,12 +140,7 @@ def _exchange(child: _Child, request: bytes) -> tuple[bool, Any]:
 
 def serve(parent: int) -> None:
     """Run calls from standard input and write their results to standard output, until the parent process ends."""
-    _serve(parent, sys.stdin.buffer, os.fdopen(os.dup(1), "wb"))
-
-
-def _serve(parent: int, requests: IO[bytes], answers: IO[bytes]) -> NoReturn:
-    global _SERVES
-    _SERVES = True
+    answers = os.fdopen(os.dup(1), "wb")
     # a library that prints must not write between the answers
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     end_with_parent(parent)
@@ -299,7 +150,7 @@ def _serve(parent: int, requests: IO[bytes], answers: IO[bytes]) -> NoReturn:
         # runs in its own thread, so that the end of the parent ends a running call too
         while True:
             try:
-                calls.put(pickle.load(requests))
+                calls.put(pickle.load(sys.stdin.buffer))
             except BaseException:
                 os._exit(1)
 

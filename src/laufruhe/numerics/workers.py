@@ -21,7 +21,7 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 from laufruhe.errors import BoundError, SolverError
 from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, until_time_limit
 from laufruhe.numerics.cores import processors
-from laufruhe.numerics.processes import ForkedWorker, Processes
+from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.witness import collected, report
 
@@ -95,27 +95,6 @@ def executor_for(maximum: int | None = None) -> Iterator[Executor]:
 def _import(*_: Callable[..., object]) -> None:
     # unpickling the arguments has imported their modules
     return
-
-
-@contextmanager
-def worker_pool(*works: Callable[..., object]) -> Iterator[None]:
-    """Start processes for all searches in the block, which will run these functions, and end them after it.
-
-    No process is started if there is a current executor, or only one processor.
-    """
-    workers = processors()
-    if _current.get() is not None or workers == 1:
-        yield
-        return
-    # a forked copy has imported all modules of this process
-    pool = Processes(workers, ForkedWorker.several(workers))
-    try:
-        for _ in range(workers):
-            pool.submit(_import, *works)
-        with working_on(pool):
-            yield
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def worker_count(executor: Executor | None = None) -> int:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import chdir
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -18,7 +16,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from laufruhe.errors import refused, wrong_call
-from laufruhe.numerics.processes import fork_map
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg as as_svg
 from laufruhe.plots.style import drawn_on, save, save_and_show
@@ -85,30 +82,13 @@ def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple
     return tuple(files)
 
 
-def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], picture_names: Iterable[str]) -> dict[str, str]:
-    """Write some pictures as files of these kinds, and return them as SVG by name."""
+def draw_and_show(result: Result, folder: Path, kinds: Sequence[str]) -> dict[str, str]:
+    """Write all pictures as files of these kinds, and return them as SVG by name."""
     folder.mkdir(parents=True, exist_ok=True)
-    return {name: save_and_show(figure(result, name), folder / name, kinds) for name in picture_names}
+    return {name: save_and_show(figure(result, name), folder / name, kinds) for name in names(result)}
 
 
 def get_ready() -> None:
     """Import all modules that draw."""
     for name in PICTURES:
         import_module(PICTURES[name].module)
-
-
-def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: int) -> dict[str, str]:
-    """Draw all pictures of a result into files, divided among several processes; return them as SVG by name."""
-    # find fonts once, for all processes
-    prepare(_words(result))
-    picture_names, (read_end, write_end) = names(result), os.pipe()
-    os.write(write_end, bytes(range(len(picture_names))))
-    os.close(write_end)
-    # an idle process takes the next picture: only one process reads a byte of the pipe
-    numbered = (picture_names[number[0]] for number in iter(partial(os.read, read_end, 1), b""))
-    parts = fork_map(lambda _: draw_and_show(result, folder, kinds, numbered), count)
-    os.close(read_end)
-    svg_by_name = {name: svg for part in parts for name, svg in part.items()}
-    # pictures of a process that died
-    svg_by_name |= draw_and_show(result, folder, kinds, [name for name in picture_names if name not in svg_by_name])
-    return {name: svg_by_name[name] for name in picture_names}

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import astuple, fields
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,6 @@ import numpy as np
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.processes import run_concurrently
 from laufruhe.physics.bearing_loads import wear_of
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.torque import excess_torque, swing_of, torque_parts, turning_inertia
@@ -56,8 +53,6 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue, LimitValue
 
 MAX_ROWS = 20 * STEPS
-MANY = 5_000
-"""Number of cells from which a forked process writes the workbook."""
 
 
 def number_tables(result: Result) -> dict[str, Table]:
@@ -297,16 +292,10 @@ _TABLES: NumberTables = {
 }
 
 
-@contextmanager
-def write_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]:
-    """Write a CSV file for every table, and a workbook, into an existing folder.
-
-    Yield a function that waits for the workbook, which a forked process writes if it is large.
-    """
+def write_tables(result: Result, folder: Path) -> None:
+    """Write a CSV file for every table, and a workbook, into an existing folder."""
     tables = number_tables(result)
-    cells = sum(len(table.head) * len(table.rows) for table in tables.values())
-    book = partial(write_book, tables, folder / files.BOOK) if tables else lambda: None
-    with run_concurrently(book, cells > MANY) as wait_for_book:
-        for name, table in tables.items():
-            write_csv(table, folder / f"{name}.csv")
-        yield wait_for_book
+    for name, table in tables.items():
+        write_csv(table, folder / f"{name}.csv")
+    if tables:
+        write_book(tables, folder / files.BOOK)

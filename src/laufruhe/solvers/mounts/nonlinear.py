@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,6 @@ from laufruhe.errors import counted
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
-from laufruhe.numerics.workers import worker_pool
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
@@ -26,7 +24,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength, gap_of, gap_tolerance_of
 from laufruhe.prove.mounts.named import named_part
-from laufruhe.prove.mounts.provers import Question, provers, run_provers
+from laufruhe.prove.mounts.provers import Question, run_provers
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
@@ -42,15 +40,12 @@ from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unba
 from laufruhe.solvers.mounts.bounds import are_contradictory, bound_search, minimal_conflict, mount_numbers
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
-from laufruhe.solvers.mounts.starts import StartPoint, evaluate_design_at, evaluation_count, start_of_result
+from laufruhe.solvers.mounts.starts import StartPoint, evaluate_design_at, start_of_result
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
 
 # ratio of local optima from which the certificate mentions it
 NOTABLE_RATIO = 1.01
-# evaluated operating points from which a search takes longer than the start of workers
-MANY_EVALUATIONS = 256
 
 
 def solve_mounts(
@@ -108,26 +103,24 @@ def _search_and_bound(
     """Return the best mounts with their bounds, and the moves of the throws from their crank star [rad], (moves,)."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
-    uses_workers = evaluation_count(problem) >= MANY_EVALUATIONS and workers != 1 and not defer_bounds
-    with worker_pool(run, *(prover.bounds for prover in provers())) if uses_workers else nullcontext():
-        search = MountSearch(problem, initial, workers, moves, first, keep_initial=moves is None)
-        model_time = time.perf_counter()
-        search.run()
-        first_best = search.best_or_initial
-        is_feasible = first_best is not None and first_best.design.violation <= FEASIBILITY_TOL
-        rebalanced = _rebalanced(first_best) if first_best is not None and is_feasible else None
-        division = bound_search(problem, search, defer_bounds)
-        best = search.best_or_initial
-        timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
-        if best is None or best.design.violation > FEASIBILITY_TOL:
-            conflict = _proven_conflict(problem)
-            if not conflict and division.bound == math.inf:
-                conflict = minimal_conflict(problem)
-            result = infeasible_result(problem, initial, conflict, timing)
-            return result if conflict else failed_search(search, result), search.turns
-        if rebalanced is None or first_best is None or first_best.design.values != best.design.values:
-            # a prover has found a better design
-            rebalanced = _rebalanced(best)
+    search = MountSearch(problem, initial, workers, moves, first, keep_initial=moves is None)
+    model_time = time.perf_counter()
+    search.run()
+    first_best = search.best_or_initial
+    is_feasible = first_best is not None and first_best.design.violation <= FEASIBILITY_TOL
+    rebalanced = _rebalanced(first_best) if first_best is not None and is_feasible else None
+    division = bound_search(problem, search, defer_bounds)
+    best = search.best_or_initial
+    timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
+    if best is None or best.design.violation > FEASIBILITY_TOL:
+        conflict = _proven_conflict(problem)
+        if not conflict and division.bound == math.inf:
+            conflict = minimal_conflict(problem)
+        result = infeasible_result(problem, initial, conflict, timing)
+        return result if conflict else failed_search(search, result), search.turns
+    if rebalanced is None or first_best is None or first_best.design.values != best.design.values:
+        # a prover has found a better design
+        rebalanced = _rebalanced(best)
     best, balance_gap = rebalanced
     design, bound = best.design, division.bound
     zero_level = numerical_zero(problem, design.evaluation.engine)

@@ -13,7 +13,6 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.simulated import COARSE_STEP, Peaks, peaks_of, simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import limit_time, seconds_left, until_time_limit
-from laufruhe.numerics.workers import SERIAL, current_executor, speculation, worker_count
 from laufruhe.problem.decision import domains_of, projected_vector, real_bounds
 from laufruhe.problem.evaluation import Evaluation, objective_value, with_mounts
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
@@ -54,11 +53,6 @@ def design_at_start(problem: Problem, start: tuple[list[float], Array]) -> Desig
     mounts, columns = iter(start[0]), start[1]
     unbalances = iter(domain.complex_value(columns) for domain in domains_of(problem.unbalances))
     return evaluate_design_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])
-
-
-def evaluation_count(problem: Problem) -> int:
-    """Return the number of operating points to evaluate for all candidates, a measure of the time of a search."""
-    return _candidates(problem) * len(problem.points)
 
 
 def _candidates(problem: Problem) -> int:
@@ -107,14 +101,9 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     # higher orders hardly move the block, but take most of the time
     loads = tuple(replace(load, wrench=load.wrench.series.truncated(POOL_ORDERS)) for load in initial.loads)
     coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
-    shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
-    # workers evaluate the candidates while this process balances the initial design
-    with speculation(_scores, math.inf) as ahead:
-        with limit_time(POOL_TIME * seconds_left()):
-            ahead.prefetch(enumerate(shares))
-        unbalances = _initial_balance(problem)
-        with limit_time(POOL_TIME * seconds_left()):
-            scored = np.concatenate([ahead.result(k, share) for k, share in enumerate(shares)])
+    unbalances = _initial_balance(problem)
+    with limit_time(POOL_TIME * seconds_left()):
+        scored = _scores(problem, coarse, pool)
     best = projected_vector(domains, [d.start for d in problem.unbalances] if unbalances is None else unbalances)
     starts = [] if initial.resonance else [([d.real_start for d in decisions], best)]
     if not count:
@@ -155,12 +144,11 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
     return pool[indices], minimum
 
 
-def _scores(task: tuple[Problem, Evaluation, Array]) -> Array:
+def _scores(problem: Problem, coarse: Evaluation, points: Array) -> Array:
     """Return the sum of violated limits and the objective [SI] of each candidate start, shape (points, 2).
 
     Points not evaluated in time have infinite rows.
     """
-    problem, coarse, points = task
     if not len(points):
         return np.zeros((0, 2))
     count = len(problem.mount_decisions)

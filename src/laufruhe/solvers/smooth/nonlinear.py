@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
@@ -33,12 +33,9 @@ import numpy as np
 from laufruhe.load_models.simulated import Peaks
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
-from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import (
     WORTH_PROCESSES,
-    current_executor,
     executor_for,
-    speculation,
     unordered_map,
     worker_count,
 )
@@ -167,16 +164,12 @@ def _run_first_stage(
     """Return the local optima of the first stage from all starts, and the function that runs further starts."""
     remaining = points[1:]
     count = min(len(remaining), workers if workers is not None else worker_count())
-    # the linear solver is not safe for threads
-    ready_workers = _ReadyWorkers(stack, count) if count > 1 and isinstance(current_executor(), Processes) else None
-    if ready_workers is not None:
-        ready_workers.begin((task, remaining[:ROUND] if stop_when is not None else remaining))
     # the duration of one start decides if the others run in processes
     started = time.process_time()
     optima = run((task, points[:1]))
     spent = sum(o.seconds for o in optima)
     pays = spent * len(remaining) > WORTH_PROCESSES + (time.process_time() - started - spent)
-    run_starts: RunStarts = ready_workers or (_SharedStarts(stack, count) if count > 1 and pays else run)
+    run_starts: RunStarts = _SharedStarts(stack, count) if count > 1 and pays else run
     while remaining and not is_time_over() and not (stop_when is not None and stop_when(_merge_equal(optima, task))):
         batch, remaining = (remaining[:ROUND], remaining[ROUND:]) if stop_when is not None else (remaining, [])
         optima += run_starts((task, batch))
@@ -200,30 +193,6 @@ class _SharedStarts:
         shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
         with closing(unordered_map(run, shares, self._executor, patient=True)) as answers:
             return sorted((optimum for _, batch in answers for optimum in batch), key=lambda o: o.start)
-
-
-class _ReadyWorkers:
-    """Pool of running worker processes, which can begin starts before they are known to be needed."""
-
-    def __init__(self, stack: ExitStack, count: int) -> None:
-        self._count, self._ahead = count, stack.enter_context(speculation(run))
-
-    def begin(self, batch: StartBatch) -> None:
-        """Submit starts that are likely to be needed."""
-        self._ahead.prefetch(self._batches(batch))
-
-    def __call__(self, batch: StartBatch) -> list[LocalOptimum]:
-        """Return the local optima of a program's starts, run by the pool; a single start runs in this process."""
-        if len(batch[1]) == 1:
-            return run(batch)
-        self.begin(batch)
-        optima = [optimum for key, part in self._batches(batch) for optimum in self._ahead.result(key, part)]
-        return sorted(optima, key=lambda o: o.start)
-
-    def _batches(self, batch: StartBatch) -> list[tuple[Hashable, StartBatch]]:
-        task, points = batch
-        batches = [points[k :: self._count] for k in range(min(self._count, len(points)))]
-        return [((task.stages, tuple(number for number, _ in part)), (task, part)) for part in batches]
 
 
 def _merge_equal(optima: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
