@@ -16,10 +16,10 @@ from scipy.sparse import coo_array, csc_array
 import laufruhe
 from cli import scenes
 from laufruhe import load
-from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
+from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Norm
 from laufruhe.problem import channels
-from laufruhe.problem.measure import Limit, Measure, Term
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, lower_bound
 from laufruhe.solvers import Status, solve
@@ -125,36 +125,6 @@ def test_the_size_of_the_weights_changes_nothing(factor: float, tmp_path: Path) 
     prices = [bound.multipliers.shadow_prices(own) for bound, own in zip(bounds, (program, weighted), strict=True)]
     assert prices[0][0] > 0.0
     assert prices[1] == pytest.approx([factor * price for price in prices[0]], rel=1e-12)
-
-
-@pytest.mark.parametrize("share", [0.3, 0.7, 1.0])
-def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same optimum and price of the limit, and a bound that holds on every angle."""
-    monkeypatch.setattr(conic, "newton_solution", lambda _: None)
-    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
-    peak = replace(problem.objective[0].measure, norm=NORMS["maximum"])
-    free = AffineModel(problem).at(480)
-    loose = AffineModel(replace(problem, limits=(Limit("peak", peak, 1e9),))).at(480)
-    minimum = solve_cones(AffineModel(replace(problem, objective=(Term(peak),))).at(480)).x
-    at_mean, at_peak = (loose.limits[0][1].value(x) for x in (solve_cones(free).x, minimum))
-    maximum = at_peak + share * (at_mean - at_peak) + 1e-3 * at_peak
-    limited_so = replace(loose, limits=((maximum, loose.limits[0][1]),))
-    rows = []
-    monkeypatch.setattr(
-        conic, "run_clarabel", lambda own, *rest, run=conic.run_clarabel: rows.append(own.count) or run(own, *rest)
-    )
-    few = solve_cones(limited_so)
-    monkeypatch.setattr(conic, "FEW_ROWS", 10**9)
-    whole = solve_cones(limited_so)
-    assert max(rows[:-1]) < 0.9 * rows[-1]
-    assert few.x is not None
-    assert limited_so.violation(few.x) <= FEASIBLE
-    assert limited_so.objective(few.x) == pytest.approx(limited_so.objective(whole.x), rel=1e-7)
-    bounds = [lower_bound(limited_so, found.multipliers).value for found in (few, whole)]
-    assert bounds[0] == pytest.approx(bounds[1], rel=1e-6)
-    assert few.multipliers.shadow_prices(limited_so) == pytest.approx(
-        whole.multipliers.shadow_prices(limited_so), rel=1e-3, abs=1e-6
-    )
 
 
 def contradicted() -> AffineProblem:

@@ -23,8 +23,6 @@ from laufruhe.solvers.cones.cone_program import (
     build_program,
     project_on_sets,
     read_solution,
-    restrict_rows,
-    rows_near,
     run_clarabel,
 )
 from laufruhe.solvers.cones.equations import equations_of
@@ -38,9 +36,6 @@ ATTEMPTS: tuple[Mapping[str, Any], ...] = (
     {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-7, "max_iter": 500, "max_step_fraction": 0.9},
 )
 """Settings of the solver, in the order of the attempts."""
-FEW_ROWS, ROUNDS, NEAR_LIMIT = 500, 6, 0.95
-"""Number of rows of a peak up to which all enter the program, largest number of rounds that add rows, and share of a
-limit from which rows are added."""
 
 
 def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = None) -> ConicSolution:
@@ -70,9 +65,7 @@ def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = 
         limits=tuple(problem.limits[k] for k in limit_indices),
     )
     newton = newton_solution(scaled) if equations is None else None
-    solution = (
-        _solve_with_few_rows(scaled, equations) if newton is None else ConicSolution(*newton, 0.0, by_newton=True)
-    )
+    solution = _solve(scaled, equations) if newton is None else ConicSolution(*newton, 0.0, by_newton=True)
     solution = replace(solution, prices=weight_unit * solution.prices)
     # multipliers of a term that no decision changes are its subgradient
     rows = [norm.subgradient(np.zeros(problem.size)) for _, norm in problem.terms]
@@ -96,40 +89,6 @@ def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
             return True
         largest += scale * norm.norm.value(norm.grid, norm.slope[..., column])
     return largest > maximum * (1.0 + FEASIBLE)
-
-
-def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] | None) -> ConicSolution:
-    """Solve with only the samples (rows) of limited peaks that are near their limit; add violated ones and repeat.
-
-    A peak involves few of a thousand angles. Rows left out have zero multipliers, so bounds hold for all rows.
-    """
-    is_peak = [norm.norm.is_largest and len(norm.grid.weights) > FEW_ROWS for _, norm in problem.limits]
-    row_sets = [
-        np.union1d(0, rows_near(maximum, norm, problem.start, NEAR_LIMIT))
-        if peak
-        else np.arange(len(norm.grid.weights))
-        for peak, (maximum, norm) in zip(is_peak, problem.limits, strict=True)
-    ]
-    for _ in range(ROUNDS if any(is_peak) else 0):
-        limits = [
-            (maximum, restrict_rows(norm, rows)) for (maximum, norm), rows in zip(problem.limits, row_sets, strict=True)
-        ]
-        solution = _solve(replace(problem, limits=tuple(limits)), equations)
-        limit_rows = [np.zeros_like(norm.constant) for _, norm in problem.limits]
-        for z, rows, duals in zip(limit_rows, row_sets, solution.multipliers.limits, strict=False):
-            z[rows] = duals
-        solution = replace(solution, multipliers=replace(solution.multipliers, limits=tuple(limit_rows)))
-        if solution.x is None:
-            return solution
-        violated = [rows_near(maximum, norm, solution.x, 1.0 + FEASIBLE) for maximum, norm in problem.limits]
-        if all(np.isin(indices, rows).all() for indices, rows in zip(violated, row_sets, strict=True)):
-            return solution
-        rows_near_limit = [rows_near(maximum, norm, solution.x, NEAR_LIMIT) for maximum, norm in problem.limits]
-        row_sets = [
-            np.union1d(rows, near_rows) if peak else rows
-            for peak, rows, near_rows in zip(is_peak, row_sets, rows_near_limit, strict=True)
-        ]
-    return _solve(problem, equations)
 
 
 def _solve(problem: AffineProblem, equations: tuple[Array, Array] | None) -> ConicSolution:
