@@ -20,7 +20,6 @@ from laufruhe.files.reader import load
 from laufruhe.physics.torque import torque_parts
 from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import place_measures
-from laufruhe.report import tables
 from laufruhe.report.files import TABLES, result_files
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.table_files import write_book, write_csv
@@ -114,12 +113,7 @@ def test_the_workbook_has_a_sheet_for_every_file(result: Result, folder: Path) -
         assert list(row[1:]) == pytest.approx(own.tolist()[1:])
 
 
-@pytest.mark.parametrize("many", [0, 10**9], ids=["beside", "here"])
-def test_the_same_numbers_make_the_same_files(
-    result: Result, folder: Path, tmp_path: Path, many: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whoever writes the workbook."""
-    monkeypatch.setattr(tables, "MANY", many)
+def test_the_same_numbers_make_the_same_files(result: Result, folder: Path, tmp_path: Path) -> None:
     write_all(result, tmp_path)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
         path.name: path.read_bytes() for path in tmp_path.iterdir()

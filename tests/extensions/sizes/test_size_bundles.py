@@ -77,14 +77,3 @@ def test_rows_without_factors_are_summed_as_they_are() -> None:
     total, largest = GroupedRows.from_rows(series, z).with_factors(())
     assert total[0] == pytest.approx([np.sum(z * series.constant[0]), *np.einsum("kd,kdn->n", z, series.slope[0])])
     assert largest == 1.0
-
-
-def test_rows_that_are_never_the_largest_are_left_out() -> None:
-    """The maximum stays what it is for all unbalances of the box."""
-    random = np.random.default_rng(6)
-    piece, low = piece_of(random, 200, 2, "maximum"), np.array([-0.1, 0.0])
-    high = low + 0.2
-    few = piece.pruned(low, high)
-    assert len(few.affine.constant) < 100
-    for columns in random.uniform(low, high, (50, 2)):
-        assert few.value((), columns) == pytest.approx(piece.value((), columns), rel=1e-12)

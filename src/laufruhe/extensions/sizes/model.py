@@ -23,9 +23,8 @@ from laufruhe.load_models.affine import AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
-from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.decision import Kind, column_bounds, decision_vector, domains_of
+from laufruhe.problem.decision import Kind, decision_vector, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, with_common_base
 from laufruhe.problem.measure import Measure, Rows, kinks_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
@@ -79,22 +78,6 @@ class Piece:
         """Return the value of the norm with other factors at `columns`."""
         ratio = self.ratio(factors)
         return self.scaled(factors).value(columns) if ratio is None else ratio * self.affine.value(columns)
-
-    def pruned(self, low: Array, high: Array) -> Piece:
-        """Return the same maximum without load rows that are never the largest for unbalances in [`low`, `high`]."""
-        affine_rows, reach = self.affine, 0.5 * (high - low)
-        size = lengths(affine_rows.rows(low + reach))
-        change = np.sqrt(np.square(affine_rows.slope).sum(axis=1)) @ reach
-        may_be_largest = size + change >= (size - change).max()
-        affine = replace(
-            affine_rows,
-            constant=affine_rows.constant[may_be_largest],
-            slope=affine_rows.slope[may_be_largest],
-            grid=plain(int(may_be_largest.sum())),
-        )
-        return replace(
-            self, affine=affine, positions=tuple((k, place, affine.grid.steps) for k, place, _ in self.positions)
-        )
 
 
 def plain(rows: int) -> Grid:
@@ -313,7 +296,7 @@ class SizeModel:
     def _new_pieces(
         self, measure: Measure, length: float, kinks_at: Sequence[Array] | None = None
     ) -> tuple[Piece, ...]:
-        """Return the pieces of a measure at a rod length [m], with all rows if the angles of kinks are given."""
+        """Return the pieces of a measure at a rod length [m]."""
         evaluations, problem = self._unit_evaluations(length), self.problem
         if not measure.is_load:
             masses = [mass_rows(measure, unit.engine.rotors, unit.engine.slider_cranks) for unit in evaluations]
@@ -339,12 +322,7 @@ class SizeModel:
                 affine_rows, constant=affine_rows.constant[signal], slope=affine_rows.slope[signal], grid=plain(count)
             )
             position = ((k, place, count),)
-            piece = Piece(affine, position, tuple(self.factors(position, measure, weightless)))
-            scalar = kinks_at is None and (not piece.initial_factors or piece.initial_factors[0].size == 1)
-            if scalar:
-                ends = zip(self.mass_box, column_bounds(self.domains), strict=True)
-                piece = piece.pruned(*(np.append(masses, columns) for masses, columns in ends))
-            pieces.append(piece)
+            pieces.append(Piece(affine, position, tuple(self.factors(position, measure, weightless))))
         return tuple(pieces)
 
 
