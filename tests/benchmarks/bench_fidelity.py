@@ -26,7 +26,7 @@ from laufruhe import load  # noqa: E402
 from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE  # noqa: E402
 from laufruhe.load_models.batch import prepare  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
-from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
+from laufruhe.machine.layouts import Mechanism, build, inline  # noqa: E402
 from laufruhe.numerics.norms import NORMS  # noqa: E402
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
@@ -127,35 +127,6 @@ def batches() -> list[str]:
     ]
 
 
-def pruned() -> list[str]:
-    """ProblemFiles whose symmetry leaves something out, beside themselves with nothing left out."""
-    lines = [
-        "## What pruning alone gives",
-        "",
-        "720 samples, exact kinematics; only what is exactly zero or repeats is left out. The result is the same.",
-        "",
-        "| scene | numbers sampled, whole / pruned | ratio | time ratio, 2000 designs |",
-        "| --- | ---: | ---: | ---: |",
-    ]
-    for name, problem in _scenes():
-        own = replace(problem, fidelity=Fidelity(samples=720))
-        whole, less = prepare(own, prune=False), prepare(own)
-        values = random_decisions(own, 2000)
-        size = [sum(n.rows.shape[0] * n.rows.shape[2] for n in d.norms.values()) for d in (whole, less)]
-        times = [seconds(lambda d=d, v=values: d.objective(v)) for d in (whole, less)]
-        assert np.allclose(whole.objective(values[:50]), less.objective(values[:50]), rtol=1e-11)
-        lines.append(f"| {name} | {size[0]} / {size[1]} | {size[0] / size[1]:.1f} | {times[0] / times[1]:.1f} |")
-    return [*lines, ""]
-
-
-def _scenes() -> list[tuple[str, Problem]]:
-    six = load(ROOT / "problems" / "tractor-six.toml")
-    parts, _ = build(Cycle.FOUR_STROKE, boxer(4, 0.1, 0.03), Mechanism(0.04, 0.15, 0.5), [0.0, math.pi, 0.0, math.pi])
-    flat = Problem("boxer", "boxer", Engine("boxer", Cycle.FOUR_STROKE, parts, (), _mounts(4)),
-                   (OperatingPoint("p", 300.0),), objective=(_mean(),))  # fmt: skip
-    return [("six in line (tractor-six)", six), ("boxer of four, motored", flat)]
-
-
 def _mean() -> Term:
     return Term(Measure(channels.MOUNT_FORCE, NORMS["mean"]))
 
@@ -235,7 +206,7 @@ def main() -> None:
     """Measure and write."""
     lines = ["# Fidelity, batches and growth", "", "Processor time, the least of several calls on one core.", ""]
     table, found = growth()
-    text = "\n".join([*lines, *solves(), *batches(), *pruned(), *table]) + "\n"
+    text = "\n".join([*lines, *solves(), *batches(), *table]) + "\n"
     publish(OUT, text)
     draw(found, OUT.with_suffix(".png"))
 

@@ -60,17 +60,14 @@ def relative(bound: float, value: float) -> float:
     return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
 
 
-def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-    """Return the sampling error of a measure, in its unit; zero without samples (F7, F8).
-
-    The samples of the evaluation are compared with at least the number `finest`.
-    """
+def measure_sampling_error(measure: Measure, evaluation: Evaluation) -> float:
+    """Return the sampling error of a measure, in its unit; zero without samples (F7, F8)."""
     if measure.channel.simulation:
         return measure.channel.peak_error(evaluation.engine) * evaluation.value(measure)
     if measure.channel.depends_on_torque:
         # the remaining error is assumed to be at most the change to the finest steps
         fidelity = evaluation.fidelity
-        samples, gas_samples = (max(2 * steps, finest) for steps in (fidelity.samples, fidelity.gas_steps))
+        samples, gas_samples = (max(2 * steps, REFERENCE_SAMPLES) for steps in (fidelity.samples, fidelity.gas_steps))
         finer = replace(evaluation, fidelity=replace(fidelity, samples=samples, gas_samples=gas_samples))
         value, finer_value = evaluation.value(measure), finer.value(measure)
         return 2.0 * abs(finer_value - value) if math.isfinite(value) and math.isfinite(finer_value) else 0.0
@@ -78,7 +75,8 @@ def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int
         return 0.0
     shares = measure.shares([loads.point for loads in evaluation.loads])
     spectra, steps = one_period(evaluation.engine.cycle.base_order, signals(measure, evaluation), evaluation.samples)
-    return measure.norm.sampling_bound(spectra, shares, steps, math.ceil(finest * steps / evaluation.samples))
+    finest = math.ceil(REFERENCE_SAMPLES * steps / evaluation.samples)
+    return measure.norm.sampling_bound(spectra, shares, steps, finest)
 
 
 class ErrorReference:

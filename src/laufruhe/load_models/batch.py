@@ -166,7 +166,10 @@ class Designs:
 
     def objective(self, values: Array | ComplexArray, threads: int = 1) -> Array:
         """Return the objective of each design, shape (designs,), from complex values (designs, decisions) (C4)."""
-        return self.objective_from_features(self.features(values), threads)
+        total, features = np.zeros(len(values)), self.features(values)
+        for term in self.model.problem.objective:
+            total += term.weight * self.values(term.measure, features, threads, self.tolerance)
+        return total
 
     def are_feasible(self, values: Array | ComplexArray) -> Mask:
         """Return the mask of designs that keep all limits within `FEASIBLE`, shape (designs,)."""
@@ -183,16 +186,6 @@ class Designs:
         ]
         return np.stack([np.ones(len(values)), *columns], axis=1)
 
-    def objective_from_features(self, features: Array, threads: int = 1) -> Array:
-        """Return the objective of many designs, shape (designs,).
-
-        `features` has the vector (1, decision vector) of each design, shape (designs, 1 + columns).
-        """
-        total = np.zeros(len(features))
-        for term in self.model.problem.objective:
-            total += term.weight * self.values(term.measure, features, threads, self.tolerance)
-        return total
-
     def values(self, measure: Measure, features: Array, threads: int = 1, tolerance: float = 0.0) -> Array:
         """Return a measure of each design [SI], shape (designs,), to a relative error of `tolerance`.
 
@@ -208,16 +201,11 @@ class Designs:
             return limit.slacks(values)
         return np.full(len(values), -self.model.bare.check_limit(limit).violation)
 
-    @property
-    def columns(self) -> int:
-        """Length of the decision vector."""
-        return sum(domain.width for domain in self.model.domains)
 
-
-def prepare(problem: Problem, prune: bool = True) -> Designs:
+def prepare(problem: Problem) -> Designs:
     """Return a fast evaluator of many designs: it keeps all parts of the loads that do not depend on the decisions.
 
-    With `prune`, samples that repeat within the cycle, and components that are zero, are left out to save time.
+    Samples that repeat within the cycle, and components that are zero, are left out to save time.
 
     Raises
     ------
@@ -230,15 +218,14 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
         raise ModelError(
             f"designs that are evaluated together may differ in unbalances alone; fix {', '.join(nonlinear)}"
         )
-    model = AffineModel(problem, whole_cycle=not prune)
-    samples = model.full_samples if prune else problem.fidelity.samples
+    model = AffineModel(problem)
 
     def batched(measure: Measure) -> BatchNorm | LargestNorm:
         # peaks have the finer samples of the exact evaluation (M6)
-        norm = model.norm(measure, samples * (measure.norm.refinement if measure.is_load else 1))
-        if prune and norm.norm.is_largest_mean:
+        norm = model.norm(measure, model.full_samples * (measure.norm.refinement if measure.is_load else 1))
+        if norm.norm.is_largest_mean:
             return LargestNorm(tuple(_merged_norm(mean) for mean in _means_at_points(norm)))
-        if prune and norm.norm.is_monotone_in_lengths:
+        if norm.norm.is_monotone_in_lengths:
             return _merged_norm(norm)
         return BatchNorm(norm.norm, np.ascontiguousarray(feature_rows(norm)), norm.grid)
 

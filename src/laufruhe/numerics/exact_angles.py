@@ -146,21 +146,10 @@ def cancelling_sums(values: NDArray[np.complex128], indices: tuple[int, ...]) ->
     Sums below their rounding error are zero.
     """
     # products with matrices of zeros and ones take less time than loops
-    members, roundings = _members(indices)
+    members = (np.arange(max(indices) + 1)[:, None] == np.array(indices)).astype(float)
     parts = values.view(float)
-    return _flushed(members @ parts, roundings @ np.abs(parts) @ _both_parts(values.shape[1]))
-
-
-@lru_cache(maxsize=256)
-def _members(indices: tuple[int, ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    members = np.asarray(np.arange(max(indices) + 1)[:, None] == np.array(indices), dtype=float)
-    members.setflags(write=False)
-    return members, _rounding(len(indices)) * members
-
-
-@lru_cache(maxsize=16)
-def _both_parts(count: int) -> NDArray[np.float64]:
-    return np.asarray(np.kron(np.eye(count), np.ones((2, 2))), dtype=float)
+    sizes = members @ np.abs(parts).reshape(len(parts), -1, 2).sum(axis=2)
+    return _flushed(members @ parts, _rounding(len(indices)) * sizes.repeat(2, axis=1))
 
 
 def _rounding(count: int) -> float:

@@ -16,7 +16,7 @@ from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
 from itertools import count, islice, takewhile
 from pickle import PicklingError
-from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 from laufruhe.errors import BoundError, SolverError
 from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, until_time_limit
@@ -130,7 +130,7 @@ def unordered_map(
         If one piece is lost `LOSSES` times, or no worker is left.
     """
     remaining = enumerate(until_time_limit(pieces) if patient else pieces)
-    pending: dict[Future[Answer[A]], tuple[int, T, int]] = {}
+    pending: dict[Future[tuple[A, list[BoundError]]], tuple[int, T, int]] = {}
 
     def submit(number: int, piece: T, losses: int = 0) -> None:
         try:
@@ -194,24 +194,16 @@ def ordered_map(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[
     return answers
 
 
-class Answer(NamedTuple, Generic[A]):
-    """Result of a piece with the contradictions of bounds that its worker process has collected."""
-
-    answer: A
-    reports: tuple[BoundError, ...]
-
-
-def _answer_of(until: float, work: Callable[[T], A], piece: T) -> Answer[A]:
-    # runs in the worker, which starts no workers of its own
+def _answer_of(until: float, work: Callable[[T], A], piece: T) -> tuple[A, list[BoundError]]:
+    # runs in the worker, which starts no workers of its own and collects contradictions of bounds
     with limit_time(until - time.time()), working_on(SERIAL), collected() as reports:
-        answer = work(piece)
-    return Answer(answer, tuple(reports))
+        return work(piece), reports
 
 
-def _reported(answer: Answer[A]) -> A:
-    for error in answer.reports:
+def _reported(answer: tuple[A, list[BoundError]]) -> A:
+    for error in answer[1]:
         report(error)
-    return answer.answer
+    return answer[0]
 
 
 def _workers_gone(executor: Executor, error: BaseException) -> WorkersGone:
@@ -231,7 +223,7 @@ class Speculation(Generic[T, A]):
         self._executor: Executor | None = None
         self._processes: Processes | None = None
         self._starting: list[Future[None]] = []
-        self._pending: dict[Hashable, Future[Answer[A]]] = {}
+        self._pending: dict[Hashable, Future[tuple[A, list[BoundError]]]] = {}
         self.hits = 0
 
     def prefetch(self, steps: Iterable[tuple[Hashable, T]]) -> None:

@@ -1,4 +1,4 @@
-"""Sizes of the running gear: their stresses, and proven optima of open sizes, also with stars or elastic mounts."""
+"""Sizes of the running gear: their stresses, and proven optima of open sizes, also with stars."""
 
 from laufruhe.extension import Extension
 
@@ -28,5 +28,5 @@ EXTENSION = Extension(
         "running-gear mass  0 0 0  0 + 0  0  0 0  0  torsion=0",
     ),
     keys=(f"{_HERE}.file:KEY",),
-    methods=tuple(f"{_HERE}.methods:{name}" for name in ("ALONE", "WITH_STARS", "WITH_MOUNTS")),
+    methods=tuple(f"{_HERE}.methods:{name}" for name in ("ALONE", "WITH_STARS")),
 )

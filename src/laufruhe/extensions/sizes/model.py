@@ -166,13 +166,6 @@ class SizeModel:
 
         return _cached(self._masses, x, masses_of_gear)
 
-    def with_masses(self, masses: Array) -> Engine:
-        """Return the initial engine with other masses of its running gear, shape (4,)."""
-        weightless = self._moving.bare
-        return _with_masses(
-            replace(self.problem.engine, slider_cranks=weightless.parts, rotors=weightless.rotors), masses
-        )
-
     def factors(
         self, positions: Sequence[tuple[int, int | None, int]], measure: Measure, engine: Engine
     ) -> list[Array]:

@@ -13,7 +13,6 @@ from laufruhe.numerics.norms.norm import (
     DUAL_TOL,
     LONGEST_TOL,
     Cones,
-    EpigraphProgram,
     Grid,
     Norm,
     Subdifferential,
@@ -64,7 +63,7 @@ class Maximum(Norm):
         count = len(grid.weights)
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+    def smooth_expression(self, program: Any, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return a variable of the smooth program that is at least every row length, rounded near zero (E22, N3)."""
         import casadi as ca
 
@@ -73,7 +72,7 @@ class Maximum(Norm):
         return top * unit
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
+        self, program: Any, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return squared lengths, shape (k, 1), which are smooth at zero, and the limit maximum^2."""
         import casadi as ca

@@ -12,7 +12,6 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
     ZERO_TOL,
     Cones,
-    EpigraphProgram,
     Grid,
     Norm,
     Subdifferential,
@@ -91,7 +90,7 @@ class Mean(Norm):
         count = len(grid.weights)
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+    def smooth_expression(self, program: Any, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return the weighted sum of row lengths, rounded near zero by e = softness x unit (N3)."""
         import casadi as ca
 

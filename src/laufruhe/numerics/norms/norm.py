@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,19 +112,6 @@ class Cones:
     centred: bool = False
     linear_rows: tuple[NDArray[np.intp], NDArray[np.intp], Array] | None = None
     squares: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]] | None = None
-
-
-class EpigraphProgram(Protocol):
-    """Nonlinear program to which the smooth form of a norm adds variables and constraints (N3, E22)."""
-
-    def head(self, value: Any) -> Any:
-        """Return a new nonnegative epigraph variable that starts at `value`."""
-
-    def free(self, value: Any) -> Any:
-        """Return new variables without bounds that start at `value`, in its shape."""
-
-    def hold(self, expression: Any) -> None:
-        """Constrain every entry to be at most zero."""
 
 
 _ONLY: dict[type[Norm], Norm] = {}
@@ -283,13 +270,13 @@ class Norm(ABC):
         """Return the norm of rows on a grid as second-order cones (P1)."""
         raise self._unclaimed("cones")
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+    def smooth_expression(self, program: Any, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return a smooth CasADi expression of the norm to minimise (N3, E22).
 
         Parameters
         ----------
         program
-            Program that receives epigraph variables and their constraints.
+            Collector of epigraph variables (`head`, `free`) and of constraints at most zero (`hold`).
         rows
             CasADi matrix, shape (k, d).
         unit, softness
@@ -299,7 +286,7 @@ class Norm(ABC):
         raise self._unclaimed("smooth form")
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
+        self, program: Any, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return a smooth form of the limit norm(rows) <= maximum.
 

@@ -21,7 +21,6 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
     LONGEST_TOL,
     MAX_KINKS,
     Cones,
-    EpigraphProgram,
     Grid,
     Norm,
     Subdifferential,
@@ -109,7 +108,7 @@ class PeakToPeak(Norm):
         count = len(grid.weights)
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+    def smooth_expression(self, program: Any, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return twice a variable of the smooth program that is at least the radius of every enclosing ball (E22).
 
         Distances from the centre are rounded near zero by e = softness x unit (N3).

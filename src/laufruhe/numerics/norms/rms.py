@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.norm import Cones, EpigraphProgram, Grid, Norm, Subdifferential, lengths, mean_square
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, Subdifferential, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 
@@ -68,7 +68,7 @@ class RootMeanSquare(Norm):
         """Return one cone with all rows, each multiplied by the root of its weight."""
         return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), is_single=True)
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+    def smooth_expression(self, program: Any, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return sqrt(N^2 + e^2) - e with N the norm and e = softness x unit."""
         import casadi as ca
 
@@ -76,7 +76,7 @@ class RootMeanSquare(Norm):
         return ca.sqrt(ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)) + absolute_softness**2) - absolute_softness
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
+        self, program: Any, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return the mean square, which is smooth at zero, and the limit maximum^2."""
         import casadi as ca

@@ -11,7 +11,6 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
     Cones,
-    EpigraphProgram,
     Grid,
     Norm,
     Subdifferential,
@@ -94,7 +93,7 @@ class RootMeanQuad(Norm):
             ),
         )
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+    def smooth_expression(self, program: Any, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return (N^4 + e^4)^(1/4) - e with N the norm and e = softness x unit."""
         import casadi as ca
 
@@ -102,7 +101,7 @@ class RootMeanQuad(Norm):
         return unit * (ca.sqrt(ca.sqrt(ca.dot(ca.DM(grid.weights), squares * squares) + softness**4)) - softness)
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
+        self, program: Any, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return the mean of fourth powers, which is smooth at zero, and the limit maximum^4."""
         import casadi as ca

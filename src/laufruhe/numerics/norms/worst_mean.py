@@ -15,7 +15,6 @@ from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import (
     LONGEST_TOL,
     Cones,
-    EpigraphProgram,
     Grid,
     Norm,
     Subdifferential,
@@ -90,7 +89,7 @@ class WorstMean(Norm):
         )
         return Cones(value, np.arange(count), np.ones(count), linear_rows=linear_rows)
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+    def smooth_expression(self, program: Any, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return a variable of the smooth program: at least every point's mean row length, rounded at zero (E22)."""
         import casadi as ca
 
