@@ -84,16 +84,7 @@ def _first_octant(turn: Fraction) -> tuple[float, float]:
 @lru_cache(maxsize=256)
 def _roots(denominator: int) -> NDArray[np.complex128]:
     # `cis` of the turns 0, 1 / denominator, 2 / denominator ...
-    eighths, remainder = np.divmod(8 * np.arange(denominator), denominator)
-    small = np.where(eighths % 2 == 1, denominator - remainder, remainder)
-    angles = (math.tau * (small / (8.0 * denominator))).tolist()
-    cosines, sines = np.array([(math.cos(angle), math.sin(angle)) for angle in angles]).T
-    for exact, share in ((Fraction(1, 12), 12 * small == 8 * denominator), (Fraction(1, 8), small == denominator)):
-        cosines[share], sines[share] = _first_octant(exact)
-    across, along = np.where(eighths % 2 == 1, (sines, cosines), (cosines, sines))
-    table = np.empty(denominator, dtype=complex)
-    table.real = np.choose(eighths // 2, [across, -along, -across, along])
-    table.imag = np.choose(eighths // 2, [along, across, -along, -across])
+    table = np.array([cis.__wrapped__(Fraction(k, denominator)) for k in range(denominator)])
     table.setflags(write=False)
     return table
 
@@ -121,23 +112,13 @@ def star_sum(
     m are multiples of the base order. The n members k of the star have weights w in c components, shape (n, c), and
     angles t in turns. Real and imaginary parts below the rounding error of their sum, (n + 2) eps sum |w|, are zero.
     """
-    return _star_sum(phasors(turns, multiples), weights)
+    waves = phasors(turns, multiples)
+    return _flushed((waves @ weights).view(float), _rounding(len(weights)) * np.abs(weights).sum(axis=0).repeat(2))
 
 
 def star_orders(weights: NDArray[np.float64], turns: tuple[Turn, ...], count: int) -> NDArray[np.complex128]:
-    """Return the sums of `star_sum` for the multiples 0 ... count - 1, shape (count, c), with cached phasors."""
-    return _star_sum(_waves(turns, count), weights)
-
-
-@lru_cache(maxsize=8)
-def _waves(turns: tuple[Turn, ...], count: int) -> NDArray[np.complex128]:
-    waves = phasors(turns, np.arange(count))
-    waves.setflags(write=False)
-    return waves
-
-
-def _star_sum(waves: NDArray[np.complex128], weights: NDArray[np.float64]) -> NDArray[np.complex128]:
-    return _flushed((waves @ weights).view(float), _rounding(len(weights)) * np.abs(weights).sum(axis=0).repeat(2))
+    """Return the sums of `star_sum` for the multiples 0 ... count - 1, shape (count, c)."""
+    return star_sum(weights, turns, np.arange(count))
 
 
 def cancelling_sums(values: NDArray[np.complex128], indices: tuple[int, ...]) -> NDArray[np.complex128]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, lru_cache, reduce
+from functools import cached_property, reduce
 from math import gcd, lcm
 from typing import Any
 
@@ -301,13 +301,8 @@ def spectrum_with_kinks(
     if len(kinks.angles) > maximum:
         kinks = kinks.strongest(maximum)
     remainder = spectrum_of(values[-samples:] - kinks.values(later, period), base)
-    smooth = (remainder.coefficients.T * _delay(samples, base)).T
+    smooth = (remainder.coefficients.T * np.exp(-1j * SAME_ANGLE * remainder.orders)).T
     return Spectrum(base, smooth + kinks.coefficients(len(smooth), float(base)), kinks)
-
-
-@lru_cache(maxsize=16)
-def _delay(samples: int, base: Fraction) -> NDArray[np.complex128]:
-    return np.asarray(np.exp(-1j * SAME_ANGLE * float(base) * np.arange(samples // 2 + 1)))
 
 
 def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:
