@@ -17,7 +17,7 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
-from laufruhe.numerics.norms import MEAN, Grid, Norm
+from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 
@@ -142,22 +142,11 @@ class BatchNorm:
 
 
 @dataclass(frozen=True, eq=False)
-class LargestNorm:
-    """Largest of several norms, such as the means at all operating points, for many designs."""
-
-    parts: tuple[BatchNorm, ...]
-
-    def values_within(self, tolerance: float, features: Array, threads: int = 1) -> Array:
-        """Return the largest norm of each design, shape (designs,), as `BatchNorm.values_within` does."""
-        return np.asarray(np.max([part.values_within(tolerance, features, threads) for part in self.parts], axis=0))
-
-
-@dataclass(frozen=True, eq=False)
 class Designs:
     """Problem prepared for many designs: the norms of the loads and masses that it minimises or limits."""
 
     model: AffineModel
-    norms: Mapping[Measure, BatchNorm | LargestNorm]
+    norms: Mapping[Measure, BatchNorm]
 
     @property
     def tolerance(self) -> float:
@@ -220,30 +209,15 @@ def prepare(problem: Problem) -> Designs:
         )
     model = AffineModel(problem)
 
-    def batched(measure: Measure) -> BatchNorm | LargestNorm:
+    def batched(measure: Measure) -> BatchNorm:
         # peaks have the finer samples of the exact evaluation (M6)
         norm = model.norm(measure, model.full_samples * (measure.norm.refinement if measure.is_load else 1))
-        if norm.norm.is_largest_mean:
-            return LargestNorm(tuple(_merged_norm(mean) for mean in _means_at_points(norm)))
         if norm.norm.is_monotone_in_lengths:
-            return _merged_norm(norm)
+            return BatchNorm.merged(norm.norm, feature_rows(norm), norm.grid.weights, norm)
         return BatchNorm(norm.norm, np.ascontiguousarray(feature_rows(norm)), norm.grid)
 
     measures = [term.measure for term in problem.load_terms] + [limit.measure for limit in problem.load_limits]
     return Designs(model, {measure: batched(measure) for measure in measures})
-
-
-def _merged_norm(norm: AffineNorm) -> BatchNorm:
-    return BatchNorm.merged(norm.norm, feature_rows(norm), norm.grid.weights, norm)
-
-
-def _means_at_points(norm: AffineNorm) -> list[AffineNorm]:
-    # means of a load at its operating points
-    parts = (np.split(numbers, norm.grid.points) for numbers in (norm.constant, norm.slope, norm.grid.weights))
-    return [
-        AffineNorm(MEAN, constant, slope, Grid(weights / weights.sum(), norm.grid.steps))
-        for constant, slope, weights in zip(*parts, strict=True)
-    ]
 
 
 def feature_rows(norm: AffineNorm) -> Array:
