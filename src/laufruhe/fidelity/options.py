@@ -45,14 +45,6 @@ def has_gas(problem: Problem) -> bool:
     return any(point.gas is not None for point in problem.points)
 
 
-def _refuse_without_gas(problem: Problem, _: Any) -> Refusal:
-    return None if has_gas(problem) else ("needs working gas", "leave it out, or add [gas]")
-
-
-def _refuse_without_bearings(problem: Problem, _: Any) -> Refusal:
-    return None if problem.engine.bearings else ("needs main bearings", "leave it out, or list them")
-
-
 def _refuse_without_fixed_mounts(problem: Problem, value: Any) -> Refusal:
     if value == EXACT.mounts:
         return None
@@ -72,7 +64,7 @@ OPTIONS = (
     Option("gas_samples", int, {"description": "Steps of the gas torque over the working cycle.", **_STEPS}),
     # set by hand only: the automatic choice limits the orders of all loads
     Option("gas_orders", int, {"description": "Last order kept of the gas alone.", "ge": 1},
-           refusal=_refuse_without_gas),
+           refusal=lambda p, _: None if has_gas(p) else ("needs working gas", "leave it out, or add [gas]")),
     Option("orders", int, {"description": "Last order kept of pistons, rods and gas.", "ge": 1}),
     Option("crank_inertia", float,
            {"description": "Inertia of all that turns with the crank; its speed varies within the cycle."},
@@ -80,7 +72,8 @@ OPTIONS = (
     # set by hand only: real crankshafts lie between the two models
     Option("crankshaft", CrankshaftModel,
            {"description": "How main bearings share its loads: cut in its journals, or a continuous beam."},
-           is_decided=False, refusal=_refuse_without_bearings),
+           is_decided=False, refusal=lambda p, _: None if p.engine.bearings else (
+               "needs main bearings", "leave it out, or list them")),
     Option("mounts", MountModel,
            {"description": "Elastic mounts order by order, as if they gave no way, or integrated in time."},
            refusal=_refuse_without_fixed_mounts),

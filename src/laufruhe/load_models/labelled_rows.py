@@ -10,9 +10,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel, AffineNorm
-from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.curves import labelled
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.dependence import is_affine, open_kinds
@@ -151,22 +149,15 @@ def row_axes(model: AffineModel, measure: Measure, norm: AffineNorm, samples: in
     ]
     places, part = k // (steps * points), measure.load.part
     directions = tuple("xyzxyz"[part]) if part is not None else _DIRECTIONS.get(d, tuple(map(str, range(d))))
-    place = _place_axis(measure.load)
+    place = next((_PLACES[key] for key in measure.load.keys if key in _PLACES), "")
+    names = list(measure.load.places(engine))
+    place_names = [names[index] for index in measure.places(names)]
     return {
         "point": _labels(counted, points),
-        **({place: _labels(_place_names(measure, engine), places)} if place or places > 1 else {}),
+        **({place: _labels(place_names, places)} if place or places > 1 else {}),
         "angle": _angles(model, measure, samples, steps),
         "direction": list(directions),
     }
-
-
-def _place_axis(channel: LoadChannel) -> str:
-    return next((_PLACES[key] for key in channel.keys if key in _PLACES), "")
-
-
-def _place_names(measure: Measure, engine: Engine) -> list[str]:
-    names = list(measure.load.places(engine))
-    return [names[k] for k in measure.places(names)]
 
 
 def _labels(names: Sequence[str], count: int) -> list[Any]:

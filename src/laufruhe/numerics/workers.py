@@ -92,11 +92,6 @@ def executor_for(maximum: int | None = None) -> Iterator[Executor]:
         yield processes
 
 
-def _import(*_: Callable[..., object]) -> None:
-    # unpickling the arguments has imported their modules
-    return
-
-
 def worker_count(executor: Executor | None = None) -> int:
     """Return the number of workers of an executor, by default of the current one, else the number of processors."""
     executor = _current.get() if executor is None else executor
@@ -222,7 +217,7 @@ class Speculation(Generic[T, A]):
         self._began = time.perf_counter()
         self._executor: Executor | None = None
         self._processes: Processes | None = None
-        self._starting: list[Future[None]] = []
+        self._starting: list[Future[int]] = []
         self._pending: dict[Hashable, Future[tuple[A, list[BoundError]]]] = {}
         self.hits = 0
 
@@ -235,8 +230,8 @@ class Speculation(Generic[T, A]):
             if time.perf_counter() - self._began <= self._worth:
                 return
             executor = self._executor = self._processes = Processes()
-            # count starting processes as busy, so that no step waits for one
-            self._starting = [executor.submit(_import, self._work) for _ in range(worker_count(executor))]
+            # count starting processes as busy, so that no step waits for one; unpickling the work imports its module
+            self._starting = [executor.submit(id, self._work) for _ in range(worker_count(executor))]
         new = ((key, step) for key, step in steps if key not in self._pending)
         # without workers, and for steps that cannot be pickled, `result` computes the step
         with suppress(RuntimeError, OSError):

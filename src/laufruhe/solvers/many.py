@@ -192,13 +192,8 @@ def _answers(
 def _shared_decisions(problem: Problem) -> tuple[Decision, ...]:
     # those in which every measure is affine or constant
     kinds = {decision.kind for decision in problem.unbalances}
-    channels = [measure.channel for measure in _measures(problem)]
-    affine = problem.fidelity.mounts != "time" and all(is_affine(channel, kinds, problem) for channel in channels)
+    affine = problem.fidelity.mounts != "time" and all(is_affine(m.channel, kinds, problem) for m in problem.measures)
     return problem.unbalances if affine else ()
-
-
-def _measures(problem: Problem) -> list[Measure]:
-    return [*(term.measure for term in problem.objective), *(limit.measure for limit in problem.limits)]
 
 
 def _equal_rows(values: ComplexArray) -> list[Indices]:
