@@ -574,6 +574,11 @@ ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reache
 OF_SHAFT_PLACES = frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS})
 
 
+def is_at_mounts(channel: Channel) -> bool:
+    """Return True for the channels of mount force and mount travel."""
+    return channel in AT_EACH_MOUNT
+
+
 CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, RESULTANT_MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,

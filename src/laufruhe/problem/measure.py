@@ -19,7 +19,7 @@ from laufruhe.machine import Engine, OperatingPoint, Role, Rotor, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import JUMP_OFFSET, Spectrum, orders_equal
-from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
+from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, is_at_mounts
 from laufruhe.problem.loads import MeasureQuery, PointLoads
 
 
@@ -77,7 +77,7 @@ class Measure(MeasureQuery):
     @property
     def on_mounts(self) -> bool:
         """True for the force or the travel of each mount."""
-        return self.channel in AT_EACH_MOUNT
+        return is_at_mounts(self.channel)
 
     @property
     def is_inside(self) -> bool:
