@@ -82,10 +82,10 @@ def _closes_without_places(problem: Problem) -> bool:
 
 
 def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
-    """Return the best local optimum of all open numbers, with cone programs for those in which loads are affine."""
+    """Return the best local optimum of all open numbers."""
     from laufruhe.solvers.general import solve_by_local_programs
 
-    return solve_by_local_programs(problem, _solve_reduced, lambda part: _method(part).solver is _SOLVE_CONES, starts)
+    return solve_by_local_programs(problem, _solve_reduced, starts)
 
 
 def _distinguishes_stars(problem: Problem) -> bool:
