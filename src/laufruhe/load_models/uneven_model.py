@@ -121,7 +121,6 @@ class UnevenModel:
             return ca.vertcat(*rows), Grid(np.ones(len(rows)), 1)
         engine, chosen = self.problem.engine, [point for point in self.problem.points if measure.includes_point(point)]
         total_weight = sum(point.weight for point in chosen)
-        # one spectrum for each mount, one for the block, or one for each place inside the crankcase
         by_point = [
             self._load(point, lambda loads: narrow_signal(measure, measure.load.signal(loads), engine))
             for point in chosen
@@ -129,27 +128,29 @@ class UnevenModel:
         blocks: list[Any] = []
         weights: list[Array] = []
         if measure.norm.is_euclidean:
-            for point, places in zip(chosen, by_point, strict=True):
-                half = np.where(places[0].orders == 0.0, 1.0, 0.5) * point.weight / total_weight / len(places)
-                blocks += [part.T for place in places for part in (place.real, place.imaginary)]
-                weights += [half] * (2 * len(places))
+            for point, (load, places) in zip(chosen, by_point, strict=True):
+                half = np.where(load.orders == 0.0, 1.0, 0.5) * point.weight / total_weight / places
+                for part in (load.real, load.imaginary):
+                    blocks += ca.horzsplit(part.T, part.shape[0] // places)
+                weights += [half] * (2 * places)
             return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
         # orders differ between points: all have the samples that the highest order needs
-        highest = max(float(place.orders.max()) / place.base for places in by_point for place in places)
+        highest = max(float(load.orders.max()) / load.base for load, _ in by_point)
         steps = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
-        for point, places in zip(chosen, by_point, strict=True):
-            blocks += [place.sampled(steps) for place in places]
-            weights.append(np.full(len(places) * steps, point.weight / total_weight / len(places) / steps))
+        for point, (load, places) in zip(chosen, by_point, strict=True):
+            blocks += ca.horzsplit(load.sampled(steps), load.real.shape[0] // places)
+            weights.append(np.full(places * steps, point.weight / total_weight / places / steps))
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
     def wrench(self, point: OperatingPoint) -> SymbolicSpectrum:
         """Return the symbolic wrench on the block at an operating point."""
         return self._load(point, lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :]))[0]
 
-    def _load(self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum]) -> list[SymbolicSpectrum]:
-        """Return a load at one operating point as an expression of throw and bank angles, one spectrum per place.
+    def _load(self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum]) -> tuple[SymbolicSpectrum, int]:
+        """Return a load at one operating point as an expression of throw and bank angles, and its number of places.
 
-        `signal` is a function from the loads of an engine to the load, shape (n, places, d).
+        `signal` is a function from the loads of an engine to the load, shape (n, places, d). Places are mounts, parts
+        of the crankcase, or the block; the spectrum has the components of all places one after another.
         """
         p = self.problem.points.index(point)
         signals = [signal(part.loads[p]).series.truncated(HIGHEST) for parts, _, _ in self._sources for part in parts]
@@ -168,8 +169,7 @@ class UnevenModel:
             phases = ca.DM(orders).T * angle
             cosine, sine = (ca.repmat(wave(phases), places * d, 1) for wave in (ca.cos, ca.sin))
             real, imaginary = real + a * cosine - b * sine, imaginary + a * sine + b * cosine
-        by_place = [slice(k * d, (k + 1) * d) for k in range(places)]
-        return [SymbolicSpectrum(orders, real[place, :], imaginary[place, :]) for place in by_place]
+        return SymbolicSpectrum(orders, real, imaginary), places
 
     def _unbalance(self, rotor: Rotor) -> Any:
         """Return the unbalance of a rotor as expressions (re, im) [kg m], at the present angle of its throw."""
