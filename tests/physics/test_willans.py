@@ -15,9 +15,11 @@ from scipy import optimize
 import laufruhe
 import ready
 from laufruhe.errors import InputError, ModelError
-from laufruhe.physics.fidelity import EXACT
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
-from laufruhe.physics.willans import mean_pressure, motoring_friction, willans_friction
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.torque import torque_facts, torque_parts, turning_torque
+from laufruhe.physics.willans import mean_pressure, mean_torque, motoring_friction, willans_friction
 from laufruhe.plots.results import willans
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
@@ -173,6 +175,29 @@ def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
     assert loaded(tmp_path, drag).points[1].gas.imep < middle
 
 
+@pytest.mark.parametrize("fidelity", [EXACT, Fidelity(crank_inertia=0.5), Fidelity(gas_orders=4)])
+def test_the_mean_roll_moment_is_the_brake_torque(fidelity: Fidelity, tmp_path: Path) -> None:
+    """L5b: at a brake torque, at idle, at an imep, and in every torque; orders above zero are those of the gas."""
+    told = changed(BRAKE, 'file = "fuel.csv"', 'fmep = "2 bar"')
+    idle = '\n[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nbmep = "0 bar"\n'
+    given = '[[operating_points]]\nname = "given"\nspeed = "800 rpm"\nimep = "3 bar"\n[gas]'
+    problem = loaded(tmp_path, changed(told, "[gas]", idle + given))
+    volume = math.pi / 4 * 0.085**2 * 0.088 * 4
+    for point, torque in zip(problem.points, (250.0, 0.0, 1e5 * volume / (4.0 * math.pi)), strict=True):
+        loads = shaking_loads(problem.engine, point, fidelity)
+        tiny = {"rel": 1e-6, "abs": 1e-6}
+        assert loads.coefficients[0, 3].real == pytest.approx(torque, **tiny)
+        assert torque_facts(problem.engine, point).mean == pytest.approx(torque, **tiny)
+        parts = torque_parts(problem.engine, point)
+        assert (parts["gas"] + parts["friction"]).coefficients[0].real == pytest.approx(torque, **tiny)
+        rubbed = shaking_loads(problem.engine, replace(point, fmep=0.0), fidelity)
+        assert np.abs((loads + rubbed.mapped(np.negative)).coefficients[1:]).max() < 1e-9
+        assert (rubbed.coefficients - loads.coefficients)[0, 3].real == pytest.approx(mean_torque(2e5, volume, 2))
+        # a motored crank is turned against compression, without friction
+        still, moved = (turning_torque(problem.engine, replace(point, fmep=f)) for f in (0.0, 2e5))
+        assert still == moved
+
+
 @pytest.mark.parametrize(
     ("rows", "old", "new", "said"),
     [
@@ -189,7 +214,8 @@ def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
         (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\ndeviation = "1 bar"', "follows from the file"),
         (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\nload_unit = "kg"', "load_unit"),
         (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nbmep = "9 bar"', "given beside"),
-        (ROWS, 'brake_torque = "250 N m"', "", "is given, but no operating point uses it"),
+        (ROWS, 'brake_torque = "250 N m"', "gas = false", "is given, but no operating point has gas"),
+        (ROWS, 'speed = "1750 rpm"\nbrake_torque = "250 N m"', 'speed = "900 rpm"', "has 0 rows at 900 rpm"),
         (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nmotored = true', "needs combustion"),
         (ROWS, '[friction]\nfile = "fuel.csv"', "", "needs [friction]"),
         (ROWS, 'bore = "85 mm"', "", "bore"),

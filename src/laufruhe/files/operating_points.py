@@ -34,10 +34,10 @@ class OperatingPointTable(StateTable):
     speed: f.Speed | None = None
     mean_piston_speed: f.PistonSpeed | None = None
     imep: f.Pressure | None = f.optional("Indicated mean effective pressure at this point, in place of that of [gas].")
-    bmep: f.PositivePressure | None = f.optional(
-        "Brake mean effective pressure; [friction] adds what friction takes, and its uncertainty."
+    bmep: f.NonNegativePressure | None = f.optional(
+        "Brake mean effective pressure, 0 at idle; [friction] adds what friction takes, and its uncertainty."
     )
-    brake_torque: f.PositiveTorque | None = f.optional("Torque at the brake, in place of bmep.")
+    brake_torque: f.NonNegativeTorque | None = f.optional("Torque at the brake, in place of bmep.")
     motored: bool = f.optional("The charge is compressed without combustion.", False)
     gas: bool = f.optional("false: no gas at this point.", True)
     up_to: f.Speed | None = f.optional("Highest speed of a range that starts at speed.")
@@ -55,7 +55,7 @@ class FrictionTable(Table):
     speed_unit: str = "rpm"
     load_unit: str = f.optional("Unit of the load in the file: of a torque, or of a mean pressure.", "N m")
     fmep: f.PositivePressure | None = f.optional("Friction mean effective pressure, in place of a file.")
-    deviation: Annotated[float, f.Number("Pa", minimum=0.0)] | None = f.optional("Standard deviation of fmep.")
+    deviation: f.NonNegativePressure | None = f.optional("Standard deviation of fmep.")
     deviations: f.NonNegative = f.optional(
         "Number of standard deviations to either side for which the load is computed.", 2.0
     )
@@ -97,7 +97,7 @@ class Brake:
 
     def indicated(self, brake: float, speed: float, where: str) -> tuple[float, float, float]:
         """Return lowest, middle and highest indicated mean pressure for a brake mean pressure at a speed [Pa] (W4)."""
-        friction = self._friction(speed, where)
+        friction = self.friction(speed, where)
         pressures = friction.indicated(brake, self.table.deviations)
         if pressures[0] <= brake:
             rule = f"is less than its uncertainty, {units.quantity_text(friction.deviation, 'Pa')} times deviations"
@@ -122,7 +122,8 @@ class Brake:
             return self._rows
         return [row for row in self._rows if math.isclose(row[0], speed, rel_tol=SAME_SPEED)]
 
-    def _friction(self, speed: float, where: str) -> Friction:
+    def friction(self, speed: float, where: str) -> Friction:
+        """Return the friction of the operating point named `where`, at its speed (W2, W3)."""
         if self.table.fmep is not None:
             return Friction(self.table.fmep, self.table.deviation or 0.0)
         readings = self._readings(speed)
@@ -155,11 +156,11 @@ def operating_points(
             speed_text = units.quantity_text(speed, "rad/s", 6)
             name = (f"{table.name} {speed_text}" if len(speeds) > 1 else table.name) if table.name else speed_text
             loads = _loads(table, speed, brake, where, name)
-            for suffix, imep in loads:
+            for suffix, imep, fmep in loads:
                 load = _loaded(gas, table.model_copy(update={"imep": imep}), cycle, where)
                 share = table.weight / len(speeds) / len(loads) / len(states)
                 points += [
-                    OperatingPoint(f"{name}{suffix}{state.suffix}", speed, state.gas(load, cycle, where), share)
+                    OperatingPoint(f"{name}{suffix}{state.suffix}", speed, state.gas(load, cycle, where), share, fmep)
                     for state in states
                 ]
     if len(points) > MAX_POINTS:
@@ -209,8 +210,8 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
 
 def _loads(
     table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str
-) -> list[tuple[str, float | None]]:  # fmt: skip
-    """Return the loads of an operating point as pairs of name suffix and indicated mean pressure [Pa].
+) -> list[tuple[str, float | None, float]]:  # fmt: skip
+    """Return the loads of an operating point: name suffix, indicated mean pressure and that of friction [Pa].
 
     A load at the brake with an uncertain friction gives three: least, mean and most load.
     """
@@ -218,7 +219,8 @@ def _loads(
     if len(keys) > 1 or (table.motored and keys[1:]):
         raise Refused(f"{where}.{keys[0]}", None, f"is given beside {keys[1]}", "keep one")
     if table.bmep is None and table.brake_torque is None:
-        return [("", table.imep)]
+        fmep = brake.friction(speed, name).mean if brake is not None and table.gas else 0.0
+        return [("", table.imep, fmep)]
     if brake is None:
         remedy = "add [friction], which gives the loss between gas and brake"
         raise Refused(f"{where}.{keys[0]}", None, "needs [friction]", remedy)
@@ -229,8 +231,9 @@ def _loads(
     bmep = table.bmep if table.bmep is not None else brake.pressure(table.brake_torque or 0.0)
     lowest, middle, largest = brake.indicated(bmep, speed, name)
     if lowest == largest:
-        return [("", middle)]
-    return [(", least load", lowest), (", mean load", middle), (", most load", largest)]
+        return [("", middle, middle - bmep)]
+    loads = ((", least load", lowest), (", mean load", middle), (", most load", largest))
+    return [(suffix, imep, imep - bmep) for suffix, imep in loads]
 
 
 def _loaded_cylinders(gas: CylinderGases, table: OperatingPointTable, cycle: Cycle, where: str) -> CylinderGases:

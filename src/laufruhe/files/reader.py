@@ -279,8 +279,8 @@ def is_study(path: Path) -> bool:
 
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:
     """Return the problem of a file with this table [engine], which has no open throws, firing order or bank angles."""
-    loaded = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
-    cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in loaded))
+    has_gas = any(point.gas for point in file.operating_points)
+    cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and has_gas)
     bearings = bearings_of(expand_bearings(file.main_bearings, throws), cylinders)
     keys = sorted(EXTENSION_KEYS.values(), key=lambda key: not key.always)
     for key in keys:
@@ -295,9 +295,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent, is_mirrored), cycle_of(table)
     wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
-    points = operating_points(
-        loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake, cylinders
-    )
+    gas = gas_of(file.gas, path.parent, cycle, cylinders)
+    points = operating_points(file.operating_points, gas, cycle, table.stroke, brake, cylinders)
+    if without_gas:
+        points = tuple(replace(point, gas=None) for point in points)
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
         file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, bearings, wheel,
@@ -346,13 +347,15 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
     # a file without [friction] has no loads at the brake
     if file.friction is None:
         return None
-    if not any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points):
-        remedy = "give an operating point bmep or brake_torque, or leave [friction] out"
-        raise Refused("friction", None, "is given, but no operating point uses it", remedy)
+    if file.gas is None or not any(point.gas for point in file.operating_points):
+        raise Refused("friction", None, "is given, but no operating point has gas", "add [gas], or leave it out")
     if any(part.swept.piston.bore is None for part in cylinders):
-        raise Refused("engine.bore", None, "is missing, but a load at the brake needs the displacement", "add it")
-    if isinstance(file.gas, SeiligerTable | WiebeTable) and any(
-        row.imep is not None for row in file.gas.single_cylinders
+        raise Refused("engine.bore", None, "is missing, but [friction] needs the displacement", "add it")
+    has_brake = any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points)
+    if (
+        has_brake
+        and isinstance(file.gas, SeiligerTable | WiebeTable)
+        and any(row.imep is not None for row in file.gas.single_cylinders)
     ):
         rule = "shares a load at the brake equally, and [[gas.single_cylinders]] have an imep of their own"
         raise Refused("friction", None, rule, "give the operating points an imep, or remove that of the cylinders")

@@ -63,12 +63,15 @@ class OperatingPoint:
         Crank speed [rad/s].
     weight
         Weight in a measure over several points.
+    fmep
+        Friction mean effective pressure [Pa], which the torque of the gas loses inside the engine (L5b).
     """
 
     name: str
     speed: float
     gas: GasModel | None = None
     weight: float = 1.0
+    fmep: float = 0.0
 
 
 @dataclass(frozen=True)

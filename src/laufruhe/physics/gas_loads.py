@@ -1,4 +1,4 @@
-"""Roll moment of the working gas, order by order (L5)."""
+"""Roll moment of the working gas less that of friction, order by order (L5, L5b)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,20 @@ from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
 from laufruhe.physics.rigid_body import ROLL
+from laufruhe.physics.willans import mean_torque
 
 
-def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the wrench of the gas: a roll moment, the reaction to its crank torque (L5; eq. 1)."""
-    return _gas_loads(engine.cycle, engine.slider_cranks, gas, fidelity)
+def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT, fmep: float = 0.0) -> Spectrum:
+    """Return the wrench of the gas: a roll moment, the reaction to its crank torque less friction (L5, L5b; eq. 1).
+
+    Friction has a mean pressure `fmep` [Pa].
+    """
+    loads = _gas_loads(engine.cycle, engine.slider_cranks, gas, fidelity)
+    if fmep == 0.0:
+        return loads
+    displacement = sum(part.piston_area * part.stroke for part in engine.slider_cranks)
+    friction = mean_torque(fmep, displacement, engine.cycle.turns)
+    return loads + Spectrum(engine.cycle.base_order, np.array([-friction * ROLL], dtype=complex))
 
 
 @lru_cache(maxsize=64)

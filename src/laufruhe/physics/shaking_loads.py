@@ -46,7 +46,7 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     total = _moving_loads(cycle, engine.slider_cranks, fidelity).mapped(lambda loads: square * loads)
     total += rotor_loads((*engine.pins, *engine.rotors), point.speed, cycle)
     if gas is not None:
-        total += fidelity.truncated(gas_loads(engine, gas, fidelity))
+        total += fidelity.truncated(gas_loads(engine, gas, fidelity, point.fmep))
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 

@@ -29,7 +29,7 @@ def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXAC
         return inertia, None
     loads = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
     if gas is not None:
-        loads = fidelity.truncated(gas_loads(engine, gas, fidelity))
+        loads = fidelity.truncated(gas_loads(engine, gas, fidelity, point.fmep))
     if not engine.geared:
         return inertia, loads
     torque = less_load(loads.mapped(lambda wrench: wrench @ ROLL), engine, fidelity)

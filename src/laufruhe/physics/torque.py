@@ -78,7 +78,7 @@ def turning_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = E
         gas = _unfired(fidelity.gas_of(point), engine.cycle)
     except LookupError:
         return None
-    still = with_gravity(gas_torque(engine, replace(point, gas=gas), fidelity), engine, fidelity)
+    still = with_gravity(gas_torque(engine, replace(point, gas=gas, fmep=0.0), fidelity), engine, fidelity)
     steps = FINE_WORK * fidelity.samples
     angles = np.concatenate([engine.cycle.angle * np.arange(steps) / steps, still.kink_angles])
     needed = -np.concatenate([still.sample(steps), still.values(still.kink_angles)])
@@ -99,15 +99,18 @@ def _unfired(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
     """Return the torque of gas, of pistons and rods as point masses, of the rods' inertia, and of all (T1).
 
-    The weights of moving parts (T14) and a load that is not constant (T12) come last if they count.
+    Friction (L5b), the weights of moving parts (T14) and a load that is not constant (T12) come last if they count.
     """
     total, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
     masses = crank_torque(engine, still, fidelity)
     points = crank_torque(engine, still, replace(fidelity, rod="mass-only"))
-    gas, rods = total + masses.mapped(np.negative), masses + points.mapped(np.negative)
+    ideal = crank_torque(engine, replace(point, fmep=0.0), fidelity)
+    gas, rods = ideal + masses.mapped(np.negative), masses + points.mapped(np.negative)
     parts = {"gas": gas, "pistons": points, "rods": rods, "all": total}
     mean = Spectrum(total.base, total.coefficients[:1])
     zero = mean.mapped(lambda values: 0.0 * values)
+    if point.fmep:
+        parts["friction"] = mean + Spectrum(ideal.base, -ideal.coefficients[:1])
     if engine.gravity:
         parts["weights"] = with_gravity(zero, engine, fidelity)
     if engine.load_torque is not None:
@@ -130,12 +133,12 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 
 def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the torque of gas, pistons and rods that drives the output at even speed, shape (n,) [N m] (T1)."""
+    """Return the torque of gas, pistons and rods, less friction, at the output at even speed, (n,) [N m] (T1, L5b)."""
     gas = fidelity.gas_of(point)
     masses = fidelity.truncated(
         star_loads(engine.cycle, engine.slider_cranks, point.speed, lambda part: (_of_masses(part, fidelity),))
     )
-    total = masses if gas is None else masses + fidelity.truncated(gas_loads(engine, gas, fidelity))
+    total = masses if gas is None else masses + fidelity.truncated(gas_loads(engine, gas, fidelity, point.fmep))
     return total.mapped(lambda wrench: wrench @ ROLL)
 
 

@@ -152,11 +152,11 @@ def uneven_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelit
 
 
 def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the gas torque over the crank angle [N m], as the roll moment of the gas (L5)."""
+    """Return the gas torque less friction over the crank angle [N m], as the roll moment of the gas (L5, L5b)."""
     gas, cycle = fidelity.gas_of(point), engine.cycle
     if gas is None:
         return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
-    return gas_loads(engine, gas, fidelity).mapped(lambda loads: loads[:, 3])
+    return gas_loads(engine, gas, fidelity, point.fmep).mapped(lambda loads: loads[:, 3])
 
 
 def driving_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:

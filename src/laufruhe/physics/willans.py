@@ -71,6 +71,11 @@ def mean_pressure(torque: float, displacement: float, turns: int) -> float:
     return math.tau * turns * torque / displacement
 
 
+def mean_torque(pressure: float, displacement: float, turns: int) -> float:
+    """Return the mean torque [N m] of a mean effective pressure [Pa] over a cycle of some turns (W1)."""
+    return pressure * displacement / (math.tau * turns)
+
+
 def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
     """Return the friction from fuel burnt at brake mean pressures [Pa] of one speed, fuel in any unit (W2)."""
     intercept, slope, covariance = _line(brake, fuel, "load")

@@ -16,6 +16,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.torque import TorqueFacts, excess_torque, swing_of, torque_facts, torque_parts, turning_inertia
 from laufruhe.plots.style import (
     GREEN,
+    INDIGO,
     ORANGE,
     PALE,
     PURPLE,
@@ -36,7 +37,9 @@ from laufruhe.solvers.result import Result
 Unit: TypeAlias = tuple[float, str]
 STEPS, MAX_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
-COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK, "load": PURPLE, "weights": VERMILION}
+COLOURS = {
+    "gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK, "load": PURPLE, "weights": VERMILION, "friction": INDIGO,
+}  # fmt: skip
 # smallest drawn part, and smallest drawn order, relative to the largest
 MIN_PART, MIN_ORDER = 1e-3, 1e-2
 _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}

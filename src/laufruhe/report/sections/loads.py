@@ -35,7 +35,7 @@ from laufruhe.units import readable
 
 MAX_ORDERS, SHARE = 8, 0.005
 TORQUE = (
-    "Torque of gas, pistons and rods, without friction. Stored: energy that the flywheel must store. "
+    "Torque of gas, pistons and rods, less the friction of [friction]. Stored: energy that the flywheel must store. "
     "Irregularity: largest less smallest speed over the mean. To turn: largest torque that turns the crank slowly, "
     "without combustion and friction."
 )
