@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 from fractions import Fraction
@@ -14,9 +15,20 @@ from scipy.integrate import quad
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
-from laufruhe.machine import Chamber, Chambers, Cycle, Engine, OperatingPoint, PressureTrace, SliderCrank, Steam
+from laufruhe.machine import (
+    Chamber,
+    Chambers,
+    Compressor,
+    Cycle,
+    Engine,
+    OperatingPoint,
+    PressureTrace,
+    SliderCrank,
+    Steam,
+)
 from laufruhe.physics.bearing_loads import piston_pin_forces
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
 from one_cylinder import gas_torque, mean_pressure_of
 
@@ -198,7 +210,7 @@ steam = { admission = "9 bar", cut_off = 0.3, back_pressure = "1.2 bar" }
         (
             "steam =",
             'pump = { suction = "1 bar", delivery = "5 bar" }\nsteam =',
-            "give the chambers one of the keys steam, pump and trace",
+            "give the chamber one of the keys steam, pump, compressor and trace",
         ),
         ('cycle = "two-stroke"', 'cycle = "four-stroke"', "chambers, which work once a turn"),
         ('speed = "50 rpm"', 'speed = "50 rpm"\nimep = "4 bar"', "needs [gas] with model seiliger or wiebe"),
@@ -211,6 +223,67 @@ def test_files_that_contradict_themselves(old: str, new: str, said: str) -> None
         laufruhe.load(FILE.replace(old, new, 1))
     assert said in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+COMPRESSOR = {"suction": 1.2e5, "delivery": 7e5, "clearance": 0.07, "exponent": 1.25}
+
+
+@pytest.mark.parametrize("end", ["head", "crank"])
+@pytest.mark.parametrize("pressures", [(1e5, 3e5), (1.2e5, 7e5), (30e5, 31e5)])
+@pytest.mark.parametrize("exponent", [1.1, 1.4])
+def test_work_of_a_compressor_in_closed_form(end: str, pressures: tuple[float, float], exponent: float) -> None:
+    """G17b: n / (n - 1) p_s eta V (r^((n - 1) / n) - 1) a turn, whatever the rod."""
+    (suction, delivery), c = pressures, 0.07
+    diagram = Compressor(suction, delivery, c, exponent)
+    ratio = delivery / suction
+    efficiency = 1.0 + c - c * ratio ** (1.0 / exponent)
+    assert diagram.volumetric_efficiency == pytest.approx(efficiency, rel=1e-12)
+    chamber = Chamber("stage", ("cylinder 1",), end, 0.12, 0.03, diagram)
+    gain = exponent / (exponent - 1.0) * (ratio ** ((exponent - 1.0) / exponent) - 1.0)
+    work = gain * suction * efficiency * chamber.area * PART.stroke
+    torque = gas_loads(engine(PART), Chambers((chamber,), AIR)).coefficients[0, 3].real
+    assert -torque * math.tau == pytest.approx(work, rel=1e-9)
+
+
+def test_a_compressor_point_by_point() -> None:
+    """Polytropes between the pressures, in scalars."""
+    diagram, c, n = Compressor(**COMPRESSOR), 0.07, 1.25
+    chamber = replace(HEAD, diagram=diagram)
+    for degrees in (0.5, 5.0, 20.0, 60.0, 170.0, 190.0, 250.0, 300.0, 330.0, 359.0):
+        x, is_out = plain_travel(degrees), degrees < 180.0
+        expanded, squeezed = 7e5 * (c / (x + c)) ** n, 1.2e5 * ((1 + c) / (x + c)) ** n
+        wanted = max(expanded, 1.2e5) if is_out else min(squeezed, 7e5)
+        assert chamber_pressure(chamber, PART, np.radians([degrees]))[0] == pytest.approx(wanted, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"delivery": 1e5}, "must be above suction"),
+        ({"suction": 0.0}, "must be positive"),
+        ({"clearance": 0.0}, "0.03 to 0.15 is usual"),
+        ({"clearance": 0.5}, "takes no gas in"),
+        ({"exponent": 6.0}, "at most 5"),
+    ],
+)
+def test_compressors_that_cannot_be(change: dict[str, float], said: str) -> None:
+    with pytest.raises(ModelError, match=said):
+        Compressor(**COMPRESSOR | change)
+
+
+def test_equal_pistons_of_the_ready_compressor_leave_no_first_order() -> None:
+    """A vee of 90 degrees: with the mass of the first piston in the second, m r at the crank balances order one."""
+    problem = laufruhe.load("compressor-two-stage")
+    first, second = problem.engine.slider_cranks
+    (web,) = problem.engine.rotors
+    web = replace(web, unbalance=-1.9 * 0.04 * cmath.exp(1j * first.throw))
+    balanced = replace(problem.engine, slider_cranks=(first, replace(second, reciprocating_mass=1.9)), rotors=(web,))
+    loads = shaking_loads(balanced, problem.points[0]).coefficients
+    unbalanced = shaking_loads(problem.engine, problem.points[0]).coefficients
+    assert np.abs(loads[1, :3]).max() < 1e-9 * np.abs(unbalanced[1, :3]).max()
+    # two stages of about the same work
+    work = -loads[0, 3].real * math.tau
+    assert work == pytest.approx(110.2 + 114.1, rel=1e-3)
 
 
 def test_a_file_needs_no_bore_of_the_engine() -> None:

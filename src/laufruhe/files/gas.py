@@ -18,6 +18,7 @@ from laufruhe.files.recorded_trace import NEAR_FIRING, Column, RecordedTable, re
 from laufruhe.machine import (
     Chamber,
     Chambers,
+    Compressor,
     Cycle,
     GasModel,
     PressureTrace,
@@ -58,6 +59,16 @@ class PumpTable(Table):
     delivery: f.PositivePressure
 
 
+class CompressorTable(Table):
+    """A piston compressor of gas with ideal valves."""
+
+    makes: ClassVar = Compressor
+    suction: f.PositivePressure
+    delivery: f.PositivePressure
+    clearance: f.Positive = f.optional("Volume left at the dead centre, over that of the stroke.", 0.05)
+    exponent: f.Positive = f.optional("Polytropic exponent of compression and of the expansion of what is left.", 1.3)
+
+
 class ChamberTable(Table):
     """A space on one side of a piston, or of a further piston on the same rod."""
 
@@ -70,6 +81,7 @@ class ChamberTable(Table):
     rod: f.NonNegativeLength = f.optional("Diameter of the piston rod where it passes through this end.", 0.0)
     steam: SteamTable | None = None
     pump: PumpTable | None = None
+    compressor: CompressorTable | None = None
     trace: RecordedTable | None = f.optional(
         "Recorded pressure; its crank angles count from where the chamber is smallest."
     )
@@ -305,10 +317,11 @@ def _chambers(
 
 def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCrank], air: float) -> Chamber:
     where = f"gas.chambers[{k}]"
-    diagrams = {key: table_of for key in ("steam", "pump", "trace") if (table_of := getattr(table, key)) is not None}
+    keys = ("steam", "pump", "compressor", "trace")
+    diagrams = {key: table_of for key in keys if (table_of := getattr(table, key)) is not None}
     if len(diagrams) != 1:
         rule = "has no pressure" if not diagrams else f"has several pressures: {' and '.join(diagrams)}"
-        raise Refused(where, None, rule, "give the chambers one of the keys steam, pump and trace")
+        raise Refused(where, None, rule, f"give the chamber one of the keys {', '.join(keys[:-1])} and {keys[-1]}")
     ((key, diagram),) = diagrams.items()
     numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
     for number in numbers:

@@ -2,7 +2,7 @@
 
 from laufruhe.machine.block import Block
 from laufruhe.machine.bodies import Rod
-from laufruhe.machine.chambers import Chamber, Chambers, GasModel, Pump, Steam
+from laufruhe.machine.chambers import Chamber, Chambers, Compressor, GasModel, Pump, Steam
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.flywheel import Arms, Flywheel, Rim
 from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, TrappedCharge, Wiebe
@@ -19,6 +19,7 @@ __all__ = [
     "Chamber",
     "Chambers",
     "Charge",
+    "Compressor",
     "Cycle",
     "Engine",
     "Flywheel",

@@ -83,6 +83,37 @@ class Pump(Steam):
         super().__init__(suction, delivery, cut_off=1.0)
 
 
+class Compressor(Steam):
+    """A piston compressor of gas with ideal valves (G17a).
+
+    What stays in the clearance expands from the delivery pressure before fresh gas enters; compression ends where the
+    pressure opens the delivery valve.
+    """
+
+    def __init__(self, suction: float, delivery: float, clearance: float = 0.05, exponent: float = 1.3) -> None:
+        if not 0.0 < suction < delivery < math.inf:
+            raise ModelError(
+                f"delivery {delivery * 1e-5:g} bar must be above suction {suction * 1e-5:g} bar, which must be "
+                "positive; give absolute pressures"
+            )
+        if not 0.0 < clearance < math.inf:
+            raise ModelError(f"clearance {clearance:g} must be positive; 0.03 to 0.15 is usual")
+        shrinking = (suction / delivery) ** (1.0 / exponent) if exponent > 0.0 else 1.0
+        expanded = clearance / shrinking - clearance
+        if expanded >= 1.0:
+            raise ModelError(
+                f"clearance {clearance:g} takes no gas in, because what it holds at {delivery * 1e-5:g} bar fills the "
+                f"cylinder at {suction * 1e-5:g} bar; reduce the clearance, or divide the pressures among stages"
+            )
+        opened = (1.0 + clearance) * shrinking - clearance
+        super().__init__(delivery, suction, 0.0, expanded, 1.0, opened, clearance, exponent)
+
+    @property
+    def volumetric_efficiency(self) -> float:
+        """Gas taken in, at suction pressure, over the volume of the stroke."""
+        return 1.0 - self.release
+
+
 @dataclass(frozen=True)
 class Chamber:
     """Space that a piston enlarges and reduces once a turn.

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from laufruhe.errors import counted
+from laufruhe.machine import Chambers, Compressor
+from laufruhe.machine.chambers import models_of
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
-from laufruhe.present.numbers import DEGREE, trimmed
+from laufruhe.present.numbers import DEGREE, share, trimmed
 from laufruhe.problem.problem import Problem
 
 HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "mean torque [N m]", "power [kW]", "power [kW/l]")
@@ -19,12 +21,20 @@ def gas_rows(problem: Problem) -> list[tuple[str, ...]]:
 
 
 def gas_note(problem: Problem) -> list[str]:
-    """Return sentences on how the files of recorded traces were read."""
-    return list(dict.fromkeys(sentence for _, facts in _facts(problem) for sentence in facts.recording))
+    """Return sentences on how the files of recorded traces were read, and on what compressors take in."""
+    gases = (model for point in problem.points for model in models_of(problem.fidelity.gas_of(point)))
+    chambers = (chamber for gas in gases if isinstance(gas, Chambers) for chamber in gas.chambers)
+    compressors = (
+        f"{chamber.name} takes in {share(chamber.diagram.volumetric_efficiency)} of the volume of its stroke."
+        for chamber in chambers
+        if isinstance(chamber.diagram, Compressor)
+    )
+    recorded = (sentence for _, facts in _facts(problem) for sentence in facts.recording)
+    return list(dict.fromkeys([*recorded, *compressors]))
 
 
 def gas_lines(problem: Problem) -> list[str]:
-    """Return sentences on how the file of a recorded trace was read, and a line for each operating point with gas."""
+    """Return the sentences of `gas_note`, and a line for each operating point with gas."""
     lines, rows = [f"gas: {sentence}" for sentence in gas_note(problem)], gas_rows(problem)
     for name, peak, angle, imep, torque, power, density in rows[:_LINES]:
         lines.append(
