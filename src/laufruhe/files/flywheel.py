@@ -45,10 +45,12 @@ class RimTable(Table):
 class FlywheelTable(Table):
     """Parts that turn at crank speed, without pistons and rods."""
 
-    inertia: f.OpenInertia | None = f.optional("Moment of inertia of the whole flywheel, in place of a rim.")
+    inertia: f.OpenInertia | None = f.optional(
+        "Moment of inertia of all that turns with the crank, big ends of rods included; in place of a rim."
+    )
     rim: RimTable | None = None
     crankshaft_inertia: f.PositiveInertia | None = f.optional(
-        "Moment of inertia of the crankshaft and all else that turns, beside a rim."
+        "Moment of inertia of the crankshaft, big ends of rods and all else that turns, beside a rim."
     )
 
 
