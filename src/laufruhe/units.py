@@ -21,6 +21,14 @@ MAX_FACTORS = 12
 _QUANTITY = re.compile(
     r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .·⁻-]*|(?:1 ?)?/ ?min)?\s*$"
 )
+ATMOSPHERE = 101_325.0
+"""Standard pressure of the air [Pa]."""
+_MARKED = re.compile(
+    r"^\s*(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>m?bar|psi|[kM]?Pa|kp/cm\^?2)\s*"
+    r"\(?(?:(?P<gauge>g|gauge|ü|überdruck)|a|abs|absolute)\.?\)?\s*$",
+    re.IGNORECASE,
+)
+"""Pressure with a mark behind its unit, as in bar(g), psia or bar gauge."""
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
 """Number with a decimal comma."""
 THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
@@ -215,6 +223,8 @@ def _in_units(unit: str) -> str:
 def parse(text: str, unit: str) -> float:
     """Return the SI value of a text such as '120 mm'; `UnitError` unless it has the dimension of the SI unit `unit`."""
     match = _QUANTITY.match(text) if len(text) <= LONGEST else None
+    if unit == "Pa" and (marked := _MARKED.match(text[:LONGEST])):
+        _refuse_mark(**marked.groupdict())
     if match is None and DECIMAL_COMMA.match(text[:LONGEST]):
         point, without_comma = (text.replace(",", mark, 1).strip() for mark in (".", ""))
         point, without_comma = _written(point, unit), _written(without_comma, unit)
@@ -233,6 +243,15 @@ def parse(text: str, unit: str) -> float:
     if not math.isfinite(value) or not math.isfinite(below):
         raise UnitError(f"is not finite; {advice(unit)}")
     return value
+
+
+def _refuse_mark(number: str, unit: str, gauge: str | None) -> None:
+    # the unit of the pressure is marked as that of a gauge or as absolute
+    plain = f'"{number} {unit}"'
+    if not gauge:
+        raise UnitError(f"has a mark, and pressures are absolute without one; write {plain}")
+    bars = 1e-5 * (float(number) * _factor(unit, "Pa") + ATMOSPHERE)
+    raise UnitError(f'is a pressure above that of the air; write "{bars:.4g} bar", or {plain} for a mean pressure')
 
 
 def unit_of(text: str) -> str:

@@ -12,6 +12,7 @@ from _pytest.mark.structures import ParameterSet
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.machine import Cycle, PressureTrace, Seiliger
+from laufruhe.machine.chambers import CylinderGases
 from laufruhe.problem.evaluation import evaluate
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, open_unbalance, shaft, written
 
@@ -265,6 +266,17 @@ BAD = [
         "line 2, column 7: is no TOML: no = follows the key; write key = value"),
     bad("no end of text", 'title = "Four', "title = \"Four\ntitle = \"",
         "line 2, column 14: is no TOML: the text is not closed"),
+    bad("a firing order in words", "[1, 3, 4, 2]", '"1-3-4-2"',
+        'engine.firing_order = "1-3-4-2": is no list; write [1, 3, 4, 2]'),
+    bad("one stiffness", "[mounts]", '[mounts]\nstiffness = "150 N/mm"',
+        'mounts.stiffness = "150 N/mm": must be a list in [ ], or tables in [[ ]]; write for example ["150 N/'),
+    bad("mass of a ring without its diameter", "[mounts]", '[flywheel]\nmass = "40 kg"\n[mounts]',
+        "flywheel.mean_diameter: is missing; give mass and mean_diameter of a ring"),
+    bad("a ring and an inertia", "[mounts]",
+        '[flywheel]\nmass = "40 kg"\nmean_diameter = "1 m"\ninertia = "1 kg m^2"\n[mounts]',
+        "flywheel.mass: is given beside inertia; keep one"),
+    bad("a peak of a burn", 'speed = "2500 rpm"', 'speed = "2500 rpm"\nmotored = true\npeak_pressure = "60 bar"',
+        "operating_points[1].peak_pressure: is given for a motored point"),
     bad("long number", "0.26", "9" * 5000,
         "file: contains a whole number of thousands of digits; shorten it"),
     bad("key given twice", "layout =", "cycle =",
@@ -273,6 +285,45 @@ BAD = [
         '[[constraints]]\nlimit = "balancer mass"\nmax = "5 kg"\n[[constraints]]'
         ), "constraints[2].max: limits 'balancer mass' once more, beside constraints[1] ('balancer mass')"),
 ]  # fmt: skip
+
+
+def test_all_missing_keys_are_told_at_once() -> None:
+    """Whatever finds them: the model of the file, the engine, its layout, an operating point."""
+    with pytest.raises(InputError) as caught:
+        load('title = "x"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n[gas]\nmodel = "wiebe"\nimep = "1 bar"\n'
+             "start = 0\n[[operating_points]]\nweight = 1\n")  # fmt: skip
+    keys = [complaint.where for complaint in caught.value.complaints]
+    assert keys == ["gas.duration", *(f"engine.{key}" for key in (
+        "stroke", "reciprocating_mass", "bore", "cylinders", "rod_ratio", "cylinder_spacing", "throws"
+    ))]  # fmt: skip
+    assert all(complaint.rule.startswith("is missing") for complaint in caught.value.complaints)
+
+
+def test_a_ring_has_the_inertia_of_its_mean_radius(tmp_path: Path) -> None:
+    ring = '[flywheel]\nmass = "40 kg"\nmean_diameter = "500 mm"\ncrankshaft_inertia = "0.2 kg m^2"\n'
+    wheel = load(written(tmp_path, WHOLE + ring)).engine.flywheel
+    assert wheel is not None
+    assert wheel.inertia == pytest.approx(40.0 * 0.25**2 + 0.2)
+
+
+def test_pressures_of_an_operating_point(tmp_path: Path) -> None:
+    """They take the place of those of the gas; single cylinders keep their ratio to the common ones."""
+    point = (
+        '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nimep = "1.1 kp/cm^2"\npeak_pressure = "20 kp/cm^2"\n'
+    )
+    point += 'intake_pressure = "0.4 kp/cm^2"\n'
+    single = changed(WHOLE, 'imep = "5.5 kp/cm^2"\n', 'imep = "5.5 kp/cm^2"\nsingle_cylinders = '
+                     '[{ cylinders = 2, peak_pressure = "72 kp/cm^2" }]\n')  # fmt: skip
+    bar = 9.80665e4
+    plain, of_one = (load(written(tmp_path, text + point)).points[1].gas for text in (WHOLE, single))
+    assert isinstance(plain, Seiliger)
+    assert isinstance(of_one, CylinderGases)
+    assert of_one.common == plain
+    second = of_one.of_cylinder("cylinder 2")
+    assert isinstance(second, Seiliger)
+    for gas, peak in ((plain, 20.0), (second, 18.0)):
+        numbers = gas.imep, gas.peak_pressure, gas.intake_pressure
+        assert numbers == pytest.approx((1.1 * bar, peak * bar, 0.4 * bar))
 
 
 @pytest.mark.parametrize(("old", "new", "said"), BAD)

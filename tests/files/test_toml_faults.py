@@ -32,6 +32,8 @@ FAULTS = {
     "text without end": ('a = "80 mm\nb = 1', "1:11: the text is not closed"),
     "text without quotes": ("layout = inline", 'text stands without quotes; write "inline"'),
     "no equals sign": ('bore "80 mm"\n', "1:6: no = follows the key; write key = value"),
+    "an umlaut": ('Pleuellänge = "140 mm"\n', "a to z; write rod_length or put it in quotes, as in"),
+    "an umlaut at the beginning": ("übermaß = 1", "1:1: the key übermaß has letters other than a to z; put it"),
     "no value": ("bore =\na = 1", "no value follows; write one, or leave the key out"),
     "capital letters": ("gas = True", "true and false have small letters; write true"),
     "no digit before the point": ("a = .5", "a number begins with a point; write 0.5"),

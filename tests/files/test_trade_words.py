@@ -110,6 +110,7 @@ def test_every_word_means_a_key_that_there_is() -> None:
 @pytest.mark.parametrize(
     ("key", "word", "remedy"),
     [("cycle", "Viertakt", "did you mean 'four-stroke'?"), ("layout", "Reihe", "did you mean 'inline'?"),
+     ("layout", "V8", "did you mean 'vee'?"), ("layout", "flat-4", "did you mean 'boxer'?"),
      ("rotation", "ccw", "did you mean 'counter-clockwise'?"), ("rotation", "left", "use one of: clockwise, counter")],
 )  # fmt: skip
 def test_a_value_in_words_of_the_trade(key: str, word: str, remedy: str) -> None:

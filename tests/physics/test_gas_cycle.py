@@ -545,7 +545,7 @@ class TestRefusals:
                 Seiliger(80 * BAR, 90 * BAR),
                 ["imep 90 bar", "peak_pressure 80 bar", "between", "raise peak_pressure"],
             ),
-            (Seiliger(80 * BAR, 2 * BAR), ["imep 2 bar", "lower peak_pressure"]),
+            (Seiliger(80 * BAR, 2 * BAR), ["imep 2 bar", "lower intake_pressure", "peak_pressure together"]),
             (Seiliger(40 * BAR, 5 * BAR), ["peak_pressure 40 bar", "46.4326 bar", "raise peak_pressure"]),
             (replace(BURN, imep=-BAR), ["imep -1 bar", "0 bar", "raise imep"]),
             (replace(BURN, imep=40 * BAR), ["imep 40 bar", "intake_pressure 1.01325 bar", "raise intake_pressure"]),

@@ -75,6 +75,11 @@ def test_what_is_out_of_the_usual_is_told_with_what_to_check(old: str, new: str,
     assert "; check" in found[0]
 
 
+def test_an_open_mass_may_start_anywhere() -> None:
+    text = SINGLE.replace('"0.6 kg"', '{ between = ["0 kg", "1 kg"] }') + '[objective]\nminimise = "mean roll moment"\n'
+    assert load(text).plausibility_warnings == ()
+
+
 @pytest.mark.parametrize("told", ["", "firing_order = [1, 10, 5, 7, 2, 8, 3, 9, 4, 6]", "fires_together = true"])
 def test_throws_without_a_firing_order_are_asked_about(told: str) -> None:
     """A V10 whose throws leave every cylinder at its first dead centre: all fire in one turn of two."""

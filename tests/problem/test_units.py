@@ -113,6 +113,7 @@ class TestParse:
         ("text", "unit", "rule"),
         [
             ("120", "m", "has no unit, a length needs one"),
+            ("6 barg", "N", "unit 'barg' is not known"),
             ("120 kg", "m", "'kg' is not a unit of a length"),
             ("120 mmm", "m", "unit 'mmm' is not known"),
             ("mm", "m", "is not a number with a unit"),
@@ -139,6 +140,20 @@ class TestParse:
         said, _, remedy = str(caught.value).partition("; ")
         assert said.startswith(rule)
         assert remedy.startswith(f'write for example "{example(unit)}"' if unit else "write for example 0.26")
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            ("6 barg", 'is a pressure above that of the air; write "7.013 bar", or "6 bar" for a mean pressure'),
+            ("6 bar(g)", 'is a pressure above that of the air; write "7.013 bar", or "6 bar" for a mean pressure'),
+            ("60 psi gauge", 'is a pressure above that of the air; write "5.15 bar", or "60 psi" for a mean pressure'),
+            ("2 bar (abs)", 'has a mark, and pressures are absolute without one; write "2 bar"'),
+        ],
+    )
+    def test_marks_of_gauges(self, text: str, said: str) -> None:
+        with pytest.raises(UnitError) as caught:
+            parse(text, "Pa")
+        assert str(caught.value) == said
 
     def test_plain_numbers_are_shown_as_a_file_has_them(self) -> None:
         """Without quotes, and without a unit that they have not."""

@@ -96,6 +96,24 @@ def test_orders_are_those_of_the_curves(result: Result, folder: Path) -> None:
         assert own[order] == pytest.approx(found[int(2 * order)], rel=1e-6)
 
 
+def test_components_by_order_make_the_curves(result: Result, folder: Path) -> None:
+    """Each curve is the sum of its orders: amplitude times cosine of order times angle plus phase."""
+    curves, orders = (pd.read_csv(folder / f"{name}.csv") for name in ("forces", "orders"))
+    for point in result.problem.points:
+        curve, rows = (table[table["point"] == point.name] for table in (curves, orders))
+        turns = np.outer(np.radians(curve["angle [deg]"]), rows["order"])
+        for axis in "yz":
+            size, phase = (
+                rows[f"final: {what} of shaking force {axis} [{unit}]"].to_numpy()
+                for what, unit in (("amplitude", "N"), ("phase", "deg"))
+            )
+            wanted = curve[f"final: shaking force {axis} [N]"].to_numpy()
+            summed = np.cos(turns + np.radians(phase)) @ size
+            assert summed == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max() + 1e-9)
+        hertz = rows["order"] * point.speed / math.tau
+        assert rows["final: frequency [Hz]"].to_numpy() == pytest.approx(hertz.to_numpy())
+
+
 def test_decisions_are_in_full_precision(result: Result, folder: Path) -> None:
     with (folder / "decisions.csv").open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))

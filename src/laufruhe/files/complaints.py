@@ -20,12 +20,15 @@ from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
 from laufruhe.extension import HOMES, INSTALL, Tables, missing_extension
 from laufruhe.files.fields import FORMS, Number, Open
-from laufruhe.files.toml_text import toml_key
+from laufruhe.files.nested import least_length
+from laufruhe.files.toml_text import toml_key, toml_value
 from laufruhe.files.trade_words import meanings, trade_value
 
 Loc: TypeAlias = tuple[str | int, ...]
 MAX_COMPLAINTS = 20
 """Largest number of complaints about a file at once."""
+MISSING = "is missing"
+"""Beginning of the rule about a key that is missing."""
 _CLOSE = 0.6
 _WEIGHTS = ("counterweights", "balancer_shafts")
 _MAX_NAMED = 3
@@ -184,6 +187,10 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
     if kind.startswith("model_") and tables:
         remedy = f"give {', '.join([*tables[0].model_fields][:_MAX_NAMED])} there"
         return Complaint(where, value_text(detail["input"]), _RULES[kind], remedy)
+    if kind == "list_type" and not isinstance(detail["input"], dict):
+        # the same value for every entry of a list of fixed length
+        example = toml_value([detail["input"]] * least_length(model, loc))
+        return Complaint(where, value_text(detail["input"]), _RULES[kind], f"write for example {example}")
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
     form = FORMS.get(detail["ctx"]["pattern"]) if kind == "string_pattern_mismatch" else None
     rule, _, remedy = (form or _RULES.get(kind, message)).partition("; ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
@@ -31,6 +32,9 @@ from laufruhe.problem.sets import Interval
 SMALLEST, LARGEST = 1e-40, 1e12
 # ratios are fractions with a denominator of at most a thousand
 SLOWEST = 1e-3
+
+_JOINED = re.compile(r"\s*\d+(?:\s*[-–,;/ ]\s*\d+)+\s*")
+"""Whole numbers in a row, as firing orders are written: 1-3-4-2."""
 
 T = TypeVar("T")
 TableModel = TypeVar("TableModel", bound=BaseModel)
@@ -214,6 +218,8 @@ class OrWord:
                 return raw
             if raw in dict(self.named):
                 return inner(list(dict(self.named)[raw]))
+            if _JOINED.fullmatch(raw):
+                raise refusal(f"is no list; write [{', '.join(re.findall(r'[0-9]+', raw))}]")
             words, names = [f'"{word}"' for word in self.words], ", ".join(f'"{name}"' for name, _ in self.named)
             alternatives = f", {' or '.join(words)} or a name: {names}" if names else f" or {' or '.join(words)}"
             raise refusal(

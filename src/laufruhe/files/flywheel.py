@@ -48,9 +48,11 @@ class FlywheelTable(Table):
     inertia: f.OpenInertia | None = f.optional(
         "Moment of inertia of all that turns with the crank, big ends of rods included; in place of a rim."
     )
+    mass: f.PositiveMass | None = f.optional("Mass of a ring with mean_diameter, in place of an inertia or a rim.")
+    mean_diameter: f.PositiveLength | None = f.optional("Mean diameter of the ring with this mass.")
     rim: RimTable | None = None
     crankshaft_inertia: f.PositiveInertia | None = f.optional(
-        "Moment of inertia of the crankshaft, big ends of rods and all else that turns, beside a rim."
+        "Moment of inertia of the crankshaft, big ends of rods and all else that turns, beside a mass or a rim."
     )
 
 
@@ -61,6 +63,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
     """Return the flywheel with its open numbers as decisions; without [flywheel], one with fidelity.crank_inertia."""
     if table is None:
         return None if crank_inertia is None else Flywheel(crank_inertia), []
+    table = _with_ring(table)
     require_one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")
     if table.rim is None:
         if table.crankshaft_inertia is not None:
@@ -80,6 +83,20 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
         for k, (key, unit, number) in enumerate(numbers, first)
         for decision in number.decisions(f"flywheel.{key}", unit, NumberDrive(Kind.FLYWHEEL, k))
     ]
+
+
+def _with_ring(table: FlywheelTable) -> FlywheelTable:
+    """Return the table with the inertia m D^2 / 4 of a ring in place of its mass and mean diameter (T5)."""
+    if table.mass is None and table.mean_diameter is None:
+        return table
+    for key in ("mass", "mean_diameter"):
+        if getattr(table, key) is None:
+            raise Refused(f"flywheel.{key}", None, "is missing", "give mass and mean_diameter of a ring, or inertia")
+    if table.inertia is not None or table.rim is not None:
+        rule = f"is given beside {'rim' if table.inertia is None else 'inertia'}"
+        raise Refused("flywheel.mass", None, rule, "keep one")
+    ring = 0.25 * (table.mass or 0.0) * (table.mean_diameter or 0.0) ** 2
+    return table.model_copy(update={"inertia": ring + (table.crankshaft_inertia or 0.0), "crankshaft_inertia": None})
 
 
 def _rim(table: RimTable) -> Rim:

@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeAlias, get_args, get_origin
 import numpy as np
 from pydantic import BaseModel
 
+from laufruhe import units
 from laufruhe.files import fields as f
 
 Place: TypeAlias = tuple[str | int, ...]
@@ -74,6 +75,21 @@ def number_at(model: type[BaseModel], path: Place) -> f.Number | None:
     """Return the field that reads the number at a path of a model; None for a text, count, list or choice."""
     leaves = (leaf for annotation in annotations_at(model, path) for leaf in _leaves(annotation))
     return next((leaf for leaf in leaves if isinstance(leaf, f.Number)), None)
+
+
+def example_at(model: type[BaseModel], path: Place) -> str | float | None:
+    """Return an example of the number or count at a path of a model; None for other values."""
+    number = number_at(model, path)
+    if number is not None:
+        return units.example(number.unit) if number.unit else 0.25
+    return 4 if int in (leaf for note in annotations_at(model, path) for leaf in _leaves(note)) else None
+
+
+def least_length(model: type[BaseModel], path: Place) -> int:
+    """Return the least number of entries of the list at a path of a model."""
+    leaves = [leaf for annotation in annotations_at(model, path) for leaf in _leaves(annotation)]
+    notes = [note for leaf in leaves for note in (*getattr(leaf, "metadata", ()), leaf)]
+    return max(int(getattr(note, "min_length", None) or 1) for note in [*notes, None])
 
 
 @lru_cache(maxsize=4096)

@@ -20,7 +20,16 @@ from laufruhe.extension import extended
 from laufruhe.files import edits, open_numbers
 from laufruhe.files.bearings import bearings_of, expand_bearings
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, key_path, nearest_file, read_number
+from laufruhe.files.complaints import (
+    MAX_COMPLAINTS,
+    MISSING,
+    Refused,
+    complaints_of,
+    errors_in_file,
+    key_path,
+    nearest_file,
+    read_number,
+)
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import with_fidelity
 from laufruhe.files.fields import Open, check_format
@@ -30,7 +39,7 @@ from laufruhe.files.gas import SeiligerTable, TraceTable, WiebeTable, gas_of, ne
 from laufruhe.files.load_torque import load_torque_of
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import axes_sentences, load_cases_of, mounts_of
-from laufruhe.files.nested import at, number_at, plain, walk, with_value_at
+from laufruhe.files.nested import at, example_at, number_at, plain, walk, with_value_at
 from laufruhe.files.numbering import REVERSED, sense_of
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, open_phasing
@@ -88,10 +97,40 @@ def tables_and_path(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, A
 
 
 def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
-    """Return the problem of the tables of a file; an `InputError` names the file."""
+    """Return the problem of the tables of a file; an `InputError` names the file and all keys that are missing."""
     if "study" in tables:
         raise refused("study", "", "makes this a study file", "use laufruhe study", path)
     check_format(tables, path)
+    try:
+        return _loaded(tables, path)
+    except InputError as error:
+        raise InputError(str(path), _all_missing(tables, path, error.complaints)) from None
+
+
+def _all_missing(tables: Mapping[str, Any], path: Path, complaints: tuple[Complaint, ...]) -> tuple[Complaint, ...]:
+    """Return complaints about a missing number, and those about numbers that are missing beside it.
+
+    The file is read again with an example in the place of each missing number, until something else is wrong.
+    """
+    (last, *others), missing = complaints[-1:], complaints
+    while last.rule.startswith(MISSING) and not others and len(missing) < MAX_COMPLAINTS:
+        place = tuple(int(part) - 1 if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", last.where))
+        example = example_at(file_model(), place)
+        if example is None or not isinstance(at(tables, place[:-1]), Mapping):
+            break
+        tables = with_value_at(tables, place, example)
+        try:
+            _loaded(tables, path)
+        except InputError as error:
+            last, *others = error.complaints
+            if last.rule.startswith(MISSING) and last not in missing:
+                missing = (*missing, last)
+                continue
+        break
+    return missing
+
+
+def _loaded(tables: Mapping[str, Any], path: Path) -> Problem:
     try:
         with errors_in_file(path):
             closed, parts = dict(tables), {}

@@ -10,6 +10,7 @@ from typing import Any
 
 from laufruhe import units
 from laufruhe.errors import Complaint, printed
+from laufruhe.files.trade_words import meanings
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _AT = re.compile(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", re.DOTALL)
@@ -144,6 +145,11 @@ def _fault(text: str, offset: int, message: str) -> tuple[int, str, str]:
             return offset, "a comma is missing between two entries", "add it"
         if message.startswith(("Unclosed", "Expected ']")) or (is_next and "\n" in text[bracket_offset:offset]):
             return bracket_offset, f"{text[bracket_offset]} is not closed", f"add {_CLOSING[text[bracket_offset]]}"
+    key = _WORD.match(line.strip())
+    if key and not key.group().isascii() and message.startswith(("Expected '='", "Invalid statement")):
+        meant = [f"write {name}" for name, _ in meanings(key.group()) if name]
+        rule = f"the key {key.group()} has letters other than a to z"
+        return offset, rule, " or ".join([*meant, f"put it in quotes, as in {toml_key(key.group())}"])
     for start, rule_and_remedy in _STATEMENTS.items():
         if message.startswith(start):
             return offset, *rule_and_remedy

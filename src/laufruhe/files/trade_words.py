@@ -54,5 +54,6 @@ def _values() -> dict[tuple[str, str], str]:
 
 
 def trade_value(key: str, word: str) -> str | None:
-    """Return the value of a key that a word of the trade means; None for other words."""
-    return _values().get((key, _plain(word)))
+    """Return the value of a key that a word of the trade means, also with a number as in V8; None for other words."""
+    plain = _plain(word)
+    return _values().get((key, plain)) or _values().get((key, re.sub(r"\d+", "", plain)))

@@ -99,14 +99,14 @@ class Compressor(Steam):
         if not 0.0 < clearance < math.inf:
             raise ModelError(f"clearance {clearance:g} must be positive; 0.03 to 0.15 is usual")
         shrinking = (suction / delivery) ** (1.0 / exponent) if exponent > 0.0 else 1.0
-        expanded = clearance / shrinking - clearance
-        if expanded >= 1.0:
+        suction_begin = clearance / shrinking - clearance
+        if suction_begin >= 1.0:
             raise ModelError(
                 f"clearance {clearance:g} takes no gas in, because what it holds at {delivery * 1e-5:g} bar fills the "
                 f"cylinder at {suction * 1e-5:g} bar; reduce the clearance, or divide the pressures among stages"
             )
-        opened = (1.0 + clearance) * shrinking - clearance
-        super().__init__(delivery, suction, 0.0, expanded, 1.0, opened, clearance, exponent)
+        delivery_begin = (1.0 + clearance) * shrinking - clearance
+        super().__init__(delivery, suction, 0.0, suction_begin, 1.0, delivery_begin, clearance, exponent)
 
     @property
     def volumetric_efficiency(self) -> float:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from laufruhe import units
 from laufruhe.errors import ModelError
 
-AMBIENT_PRESSURE = 101_325.0
+AMBIENT_PRESSURE = units.ATMOSPHERE
 # largest values that gas models accept
 MAX_COMPRESSION_RATIO = 1000.0
 MAX_EXPONENT = 5.0

@@ -45,16 +45,21 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
         raise ModelError(
             f"peak_pressure {in_bar(gas.peak_pressure)} is below the {in_bar(end)} at the end of compression "
             f"(ratio {gas.compression_ratio:g}, exponent {gas.compression_exponent:g}, "
-            f"from {in_bar(gas.intake_pressure)}); raise peak_pressure or lower compression_ratio",
+            f"from {in_bar(gas.intake_pressure)}); lower intake_pressure (at idle that of the manifold) or "
+            "compression_ratio, or raise peak_pressure",
             "gas.peak_pressure",
         )
     minimum, maximum = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, gas.compression_ratio)
     slack = _ROUNDING * gas.peak_pressure
     if not minimum - slack <= gas.imep <= maximum + slack:
-        remedy = "raise peak_pressure" if gas.imep > maximum else "lower peak_pressure"
+        remedy = (
+            "raise peak_pressure or lower imep"
+            if gas.imep > maximum
+            else "lower intake_pressure (at idle that of the manifold) and peak_pressure together, or raise imep"
+        )
         raise ModelError(
             f"imep {in_bar(gas.imep)} cannot be reached with peak_pressure {in_bar(gas.peak_pressure)}: from no to "
-            f"full cut-off it is between {in_bar(minimum)} and {in_bar(maximum)}; {remedy} or change imep",
+            f"full cut-off it is between {in_bar(minimum)} and {in_bar(maximum)}; {remedy}",
             "gas.imep",
         )
     if gas.imep <= minimum:

@@ -213,6 +213,26 @@ def _vector_field(name: str, words: str, unit: str, axes: tuple[CurveAxis, ...],
     return Field(name, words, unit, (*axes, CurveAxis("direction", ("x", "y", "z"))), values)
 
 
+def orders_with_phases(designs: Mapping[str, Evaluation]) -> Fields:
+    """Return the fields of `orders_of`, the frequency [Hz], and amplitude and phase [deg] of every component.
+
+    A component is its amplitude times the cosine of order times crank angle plus phase.
+    """
+    orders, fields = orders_of(designs), list[Field]()
+    for field in harmonics_of(designs).fields:
+        if field.name == "frequency":
+            fields.append(field)
+        elif field.own_axes and field.own_axes[-1].name == "direction":
+            # a resonance has no finite amplitude
+            sizes = np.where(np.isfinite(field.values), np.abs(field.values), math.inf)
+            phases = np.degrees(np.angle(np.where(sizes > 0.0, field.values, 1.0)))
+            fields.append(
+                Field(f"{field.name}_amplitude", f"amplitude of {field.words}", field.unit, field.own_axes, sizes)
+            )
+            fields.append(Field(f"{field.name}_phase", f"phase of {field.words}", "deg", field.own_axes, phases))
+    return replace(orders, fields=(*orders.fields, *fields))
+
+
 def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
     """Return natural frequencies [Hz], loss factors, energy shares and shapes of a block on elastic mounts (E6, E7).
 

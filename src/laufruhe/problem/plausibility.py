@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 
 from laufruhe.errors import Complaint, ModelError
@@ -41,13 +41,14 @@ _ROUNDING = 1e-6
 
 
 def plausibility_warnings(
-    engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False
+    engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False, open_masses: Container[str] = ()
 ) -> tuple[Complaint, ...]:
     """Return warnings about unusual numbers of an engine, such as a rod ratio above 0.5, one for each part.
 
-    `fires_together` is True if cylinders may fire at the same time without a warning.
+    `fires_together` is True if cylinders may fire at the same time without a warning. `open_masses` names the
+    slider-cranks whose reciprocating mass is open, so that its start may be any.
     """
-    warnings = [*_of_speed(engine, points), *_of_pistons(engine), *_of_rotors(engine), *_of_mounts(engine)]
+    warnings = [*_of_speed(engine, points), *_of_pistons(engine, open_masses), *_of_rotors(engine), *_of_mounts(engine)]
     warnings += [*([] if fires_together else _of_firing(engine)), *_of_gas(engine, points)]
     first: dict[str, Complaint] = {}
     for warning in warnings:
@@ -72,19 +73,18 @@ def _of_speed(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Comp
             yield Complaint(f"operating point {point.name}", "", rule, "check speed and stroke")
 
 
-def _of_pistons(engine: Engine) -> Iterator[Complaint]:
+def _of_pistons(engine: Engine, open_masses: Container[str]) -> Iterator[Complaint]:
     for part in engine.slider_cranks:
         bore, stroke = part.bore or 2.0 * part.crank_radius, 2.0 * part.crank_radius
         usual = math.pi / 4.0 * bore**2 * stroke
-        if not part.reciprocating_mass and part.has_rod:
+        mass = None if part.name in open_masses else part.reciprocating_mass
+        if mass == 0.0 and part.has_rod:
             rule = "makes no inertia force, so the pistons do not shake the block"
             yield Complaint("reciprocating mass", quantity_text(0.0, "kg"), rule, "check it")
-        elif (
-            usual > 0.0 and part.reciprocating_mass and not MIN_DENSITY < part.reciprocating_mass / usual < MAX_DENSITY
-        ):
+        elif mass and usual > 0.0 and not MIN_DENSITY < mass / usual < MAX_DENSITY:
             # 1000 kg a cubic metre is what pistons of usual engines have
             rule = f"is that of no usual piston: one that sweeps {1e6 * usual:.4g} cm^3 has about {1e3 * usual:.2g} kg"
-            yield Complaint("reciprocating mass", quantity_text(part.reciprocating_mass, "kg"), rule, "check its unit")
+            yield Complaint("reciprocating mass", quantity_text(mass, "kg"), rule, "check its unit")
         if part.bore and not FLATTEST < stroke / part.bore < LONGEST:
             rule = f"is {stroke / part.bore:.3g} times the bore"
             yield Complaint("stroke", quantity_text(stroke, "m"), rule, "check stroke and bore")

@@ -43,7 +43,7 @@ from laufruhe.present.measures import (
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
 from laufruhe.present.tables import Table
-from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
+from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_with_phases
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.report import files
 from laufruhe.report.section import EXTENSION_SECTIONS, NumberTables
@@ -277,7 +277,7 @@ _TABLES: NumberTables = {
             forces_of(designs_with_loads(result), max(min(STEPS, MAX_ROWS // len(result.problem.points)), 36))
         ),
     ),
-    "orders": (has_loads, lambda result: Table.from_fields(orders_of(designs_with_loads(result)))),
+    "orders": (has_loads, lambda result: Table.from_fields(orders_with_phases(designs_with_loads(result)))),
     "modes": (is_elastic, lambda result: Table.from_fields(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),
     "rankings": (has_ranking, _rankings),

@@ -37,9 +37,11 @@ def _modes(facts: MountingFacts, title: str) -> Table:
         rows.append(
             (name, number(frequency), "yes" if driven else "no", number(critical) if critical else DASH, *shares)
         )
-    unexcited = 6 - len(facts.excited)
-    remark = f"{unexcited} of 6 modes are not excited and not computed" if unexcited else "all modes are excited"
-    note = f"Kinetic energy in %; {remark}."
+    still = [name for j, name in enumerate(facts.modes.names) if j not in facts.excited]
+    remark = "The loads excite all modes."
+    if still:
+        remark = f"No load moves the block in {', '.join(still)}, so forces and travel have no part of these modes."
+    note = f"Kinetic energy in %. {remark}"
     if facts.depends_on_frequency:
         together = ", ".join(number(frequency) for frequency in facts.with_fluid)
         fluid = f"; block and fluid tracks together, undamped: {together} Hz" if together else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from itertools import starmap
 
 import numpy as np
@@ -90,11 +91,22 @@ def orders(result: Result) -> list[Table]:
     """
     if not has_loads(result):
         return []
+    names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
+    whole = _orders(result, names, _amplitudes, "Orders")
+    by_axis = _orders(result, ("pitching, about y", "yawing, about z"), _rocking, "Rocking couple by axis")
+    k = hardest_point(result)
+    moments = [moment_orders(design.loads[k].wrench) for design in evaluations_with_loads(result)]
+    rolling, rocking = (max(float(pair[j].max()) for pair in moments) for j in range(2))
+    return [whole, by_axis] if rocking > SHARE * rolling else [whole]
+
+
+def _orders(
+    result: Result, names: Sequence[str], amplitudes: Callable[[PointLoads], Sequence[Array]], title: str
+) -> Table:
     k, designs = hardest_point(result), evaluations_with_loads(result)
-    pairs = zip(*(_amplitudes(design.loads[k]) for design in designs), strict=True)
+    pairs = zip(*(amplitudes(design.loads[k]) for design in designs), strict=True)
     series = [column for pair in pairs for column in pair]
     length = max(len(column) for column in series)
-    names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
     unit, factor = readable("N")
     factors = np.repeat([factor if "force" in name else 1.0 for name in names], len(designs))
     table = factors * np.stack([pad_orders(column, length) for column in series], axis=1)
@@ -110,7 +122,12 @@ def orders(result: Result) -> list[Table]:
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
     selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
     note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
-    return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [{unit}, N m]", note=note)]
+    units = f"{unit}, N m" if "shaking force" in names else "N m"
+    return Table(head, rows, title=f"{title} at {result.problem.points[k].name} [{units}]", note=note)
+
+
+def _rocking(loads: PointLoads) -> list[Array]:
+    return [np.abs(loads.wrench.coefficients[:, component]) for component in (4, 5)]
 
 
 def _amplitudes(loads: PointLoads) -> list[Array]:
