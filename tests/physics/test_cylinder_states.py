@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.seiliger_cycle import trapped_charge
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, cylinder_torque, torque_facts
+from laufruhe.physics.torque import crank_torque, cylinder_torque, torque_facts, turning_torque
 
 RADIUS, ROD, BORE, RATIO, N1, INTAKE, EXHAUST = 0.0425, 0.14, 0.08, 10.0, 1.35, 0.6e5, 1.1e5
 AIR, IMEP, PEAK = 101_325.0, 4e5, 30e5
@@ -87,6 +88,26 @@ def test_torque_lacks_combustion_of_one_cylinder_alone(state: dict[str, Any], va
     # 0.5, 1 and 1.5 are orders of the cycle that even firing cancels
     assert np.abs(crank_torque(problem.engine, every).coefficients[1:4]).max() < 1e-9
     assert np.abs(lost.coefficients[1]) > 1.0
+
+
+def test_a_recorded_cylinder_without_combustion_is_that_of_misfire(tmp_path: Path) -> None:
+    """Traces of both pressures, in one file, against the cycles that they were computed from."""
+    points = ({"name": "all", "speed": "900 rpm"}, {"name": "out", "speed": "900 rpm", "misfire": [3]},
+              {"name": "motored", "speed": "900 rpm", "motored": True})  # fmt: skip
+    computed = laufruhe.load(engine_tables(*points))
+    degrees, part = np.arange(-360.0, 360.0, 1.0), computed.engine.slider_cranks[0]
+    columns = [pressure_at(computed.points[k].gas, part, Cycle.FOUR_STROKE, np.radians(degrees)) for k in (0, 2)]
+    rows = (f"{a},{p / 1e5:.9f},{q / 1e5:.9f}" for a, p, q in zip(degrees, *columns, strict=True))
+    (tmp_path / "both.csv").write_text("angle,fired,motored\n" + "\n".join(rows) + "\n")
+    gas = {"model": "trace", "file": str(tmp_path / "both.csv"), "pressure_column": "fired", "smooth": False}
+    recorded = laufruhe.load(engine_tables(*points) | {"gas": {**gas, "motored_column": "motored"}})
+    for one, other in zip(recorded.points, computed.points, strict=True):
+        found, wanted = (crank_torque(computed.engine, point).sample(360) for point in (one, other))
+        assert np.abs(found - wanted).max() < 5e-3 * np.abs(wanted).max()
+    turning = [turning_torque(computed.engine, problem.points[0]) for problem in (recorded, computed)]
+    assert turning[0].torque == pytest.approx(turning[1].torque, rel=5e-3)
+    with pytest.raises(InputError, match="record it too and name its motored_column"):
+        laufruhe.load(engine_tables(points[1]) | {"gas": gas})
 
 
 def test_closed_valves_do_no_work_and_repeat_every_turn() -> None:

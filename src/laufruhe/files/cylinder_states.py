@@ -10,9 +10,9 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
 from laufruhe.files.fields import Table
 from laufruhe.files.gas import names_of_cylinders
-from laufruhe.machine import Cycle, GasModel, Seiliger, SliderCrank, Wiebe
+from laufruhe.machine import Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases
-from laufruhe.physics.seiliger_cycle import motored_cycle, trapped_charge
+from laufruhe.physics.seiliger_cycle import motored_gas, trapped_charge
 
 SINGLY = "each"
 
@@ -55,15 +55,21 @@ class CylinderState:
             return gas
         gases = gas if isinstance(gas, CylinderGases) else gas and CylinderGases(gas, ())
 
-        def fired(name: str, key: str) -> Seiliger | Wiebe:
+        def without_combustion(name: str, key: str) -> CommonGas:
             model = gases and gases.of_cylinder(name)
-            if not isinstance(model, Seiliger | Wiebe):
-                rule = "needs [gas] with model seiliger or wiebe, which gives the pressure without combustion"
-                raise Refused(f"{where}.{key}", name, rule, "give [gas] such a model, or remove this key")
-            return model
+            if key == "cut" and isinstance(model, Seiliger | Wiebe):
+                return trapped_charge(model, self.has_open_valves)
+            motored = model and key == "misfire" and motored_gas(model, cycle)
+            if motored:
+                return motored
+            rule = "needs [gas] with model seiliger or wiebe, which gives the pressure without combustion"
+            remedy = "give [gas] such a model, or remove this key"
+            if key == "misfire" and isinstance(model, PressureTrace):
+                remedy = "record it too and name its motored_column of [gas], or remove this key"
+            raise Refused(f"{where}.{key}", name, rule, remedy)
 
-        unfired: dict[str, CommonGas] = {name: motored_cycle(fired(name, "misfire"), cycle) for name in self.misfire}
-        unfired |= {name: trapped_charge(fired(name, "cut"), self.has_open_valves) for name in self.cut}
+        unfired = {name: without_combustion(name, "misfire") for name in self.misfire}
+        unfired |= {name: without_combustion(name, "cut") for name in self.cut}
         return gases and replace(gases, single=tuple((dict(gases.single) | unfired).items()))
 
 

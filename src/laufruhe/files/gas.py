@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -152,6 +154,10 @@ class TraceTable(RecordedTable, FiredTable):
     cylinder_columns: Annotated[list[Column], Field(min_length=1, max_length=48)] | None = f.optional(
         "Names or numbers of the columns with the pressures of cylinders 1, 2, 3, ..., in place of pressure_column."
     )
+    motored_column: Column | None = f.optional(
+        "Name or number of the column of a cylinder without combustion, counted from its own firing; of points and "
+        "cylinders that are motored or misfire."
+    )
     cylinder_angles: Literal["own", "common"] = f.optional(
         'Firing from which the angles of cylinder_columns count: each from that of its cylinder ("own"), or all from '
         'that of cylinder 1 ("common").',
@@ -249,11 +255,18 @@ def _traces(
     """Return the recorded trace of cylinder 1, and those of the cylinders with columns of their own, by names."""
     chamber_cycle, pace = chamber_cycle_of(parts[0], cycle) if parts else (cycle, 1.0)
     zero, columns = _angle_zero(table, chamber_cycle), table.cylinder_columns
+    read = partial(recorded_trace, folder=folder, where="gas", cycle=chamber_cycle, pace=pace, air=air, zero=zero)
+    motored = None
+    if table.motored_column is not None:
+        if table.pressure_column is None and columns is None:
+            rule = "is given without pressure_column, which has the pressure with combustion"
+            raise Refused("gas.motored_column", table.motored_column, rule, "name both columns")
+        motored = read(table.model_copy(update={"pressure_column": [table.motored_column]}))
     if table.single_cylinders:
         rule, remedy = "means nothing with model trace", "name a column of each cylinder by cylinder_columns"
         raise Refused("gas.single_cylinders", None, rule, remedy)
     if columns is None:
-        return recorded_trace(table, folder, "gas", chamber_cycle, pace, air, zero), {}
+        return replace(read(table), motored=motored), {}
     if table.pressure_column is not None:
         raise Refused("gas.pressure_column", None, "is given beside cylinder_columns", "keep one")
     fired = [k for k, part in enumerate(parts) if part.bore != 0.0 and not any(map(part.faces, parts[:k]))]
@@ -265,7 +278,7 @@ def _traces(
     for k, column in zip(fired, columns, strict=True):
         one = table.model_copy(update={"pressure_column": [column]})
         later = parts[k].firing_angle - parts[fired[0]].firing_angle if table.cylinder_angles == "common" else 0.0
-        trace = recorded_trace(one, folder, "gas", chamber_cycle, pace, air, zero, later)
+        trace = replace(read(one, later=later), motored=motored)
         peak = math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)
         if abs(peak) > NEAR_FIRING:
             other = "own" if table.cylinder_angles == "common" else "common"

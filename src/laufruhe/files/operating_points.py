@@ -16,7 +16,7 @@ from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, 
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.cylinder_states import StateTable, cylinder_states
 from laufruhe.files.fields import Name, Table
-from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, Seiliger, SliderCrank, Wiebe
+from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
@@ -277,6 +277,8 @@ def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, wher
         return gas
     if isinstance(gas, CylinderGases):
         return _loaded_cylinders(gas, table, cycle, where)
+    if table.motored and isinstance(gas, PressureTrace) and gas.motored and not pressures:
+        return gas.motored
     if not isinstance(gas, Seiliger | Wiebe):
         key = "motored" if table.motored else next(iter(pressures))
         raise Refused(

@@ -153,12 +153,15 @@ class PressureTrace:
         Absolute pressures in the cylinder, and on the underside of the piston [Pa].
     recording
         Sentences about how the trace was read from its file.
+    motored
+        Trace of the same cylinder without combustion; None if it was not recorded.
     """
 
     angles: tuple[float, ...]
     pressures: tuple[float, ...]
     crankcase_pressure: float = AMBIENT_PRESSURE
     recording: tuple[str, ...] = field(default=(), compare=False)
+    motored: PressureTrace | None = None
 
     def __post_init__(self) -> None:
         check_pressures(self, "crankcase_pressure")

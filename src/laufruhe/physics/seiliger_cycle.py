@@ -9,7 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Charge, Cycle, Seiliger, SliderCrank, TrappedCharge, Wiebe
+from laufruhe.machine import Charge, Cycle, PressureTrace, Seiliger, SliderCrank, TrappedCharge, Wiebe
+from laufruhe.machine.chambers import CommonGas
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import rising_root
 from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
@@ -96,6 +97,13 @@ def motored_cycle(gas: Seiliger | Wiebe, cycle: Cycle) -> Seiliger:
     exponent = _exponent(gas)
     peak, imep = gas.intake_pressure * gas.compression_ratio**exponent, gas_exchange_pressure(gas, cycle)
     return Seiliger(peak, imep, compression_exponent=exponent, expansion_exponent=exponent, **_charge(gas))
+
+
+def motored_gas(gas: CommonGas, cycle: Cycle) -> Seiliger | PressureTrace | None:
+    """Return the gas of a cylinder without combustion, computed or recorded (G21); None if it is not known."""
+    if isinstance(gas, Seiliger | Wiebe):
+        return motored_cycle(gas, cycle)
+    return gas.motored if isinstance(gas, PressureTrace) else None
 
 
 def trapped_charge(gas: Seiliger | Wiebe, has_open_valves: bool) -> TrappedCharge:

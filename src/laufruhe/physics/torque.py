@@ -22,7 +22,7 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Seiliger, SliderCrank, TrappedCharge, Wiebe
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, SliderCrank, TrappedCharge
 from laufruhe.machine.chambers import CylinderGases
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.roots import rising_root
@@ -33,7 +33,7 @@ from laufruhe.physics.gravity import with_gravity
 from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, reduced, resolved_orders, two_order_roll
 from laufruhe.physics.rigid_body import ROLL
-from laufruhe.physics.seiliger_cycle import motored_cycle
+from laufruhe.physics.seiliger_cycle import motored_gas
 from laufruhe.physics.star_loads import star_loads
 from laufruhe.physics.uneven_speed import driving_torque, gas_torque, moving_inertia, start_energy
 
@@ -91,9 +91,10 @@ def _unfired(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
         return gas.mapped(lambda one: _unfired(one, cycle))  # type: ignore[arg-type, return-value]
     if gas is None or isinstance(gas, TrappedCharge):
         return gas
-    if isinstance(gas, Seiliger | Wiebe):
-        return motored_cycle(gas, cycle)
-    raise LookupError("pressure without combustion")
+    motored = motored_gas(gas, cycle)
+    if motored is None:
+        raise LookupError("pressure without combustion")
+    return motored
 
 
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
