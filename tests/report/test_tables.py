@@ -15,7 +15,7 @@ from laufruhe.present.tables import Table, escape_markdown, strip_markdown
 from laufruhe.report.document import Bullets, Document, Paragraph
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show, show_document
-from laufruhe.report.sections import tables_of
+from laufruhe.report.sections import elastic, loads, tables_of
 from laufruhe.report.wording import explained, headline, why_star
 from laufruhe.solvers import Result
 from laufruhe.studies.text import marked_table
@@ -244,3 +244,21 @@ def test_numbers_of_a_study_stand_below_each_other() -> None:
     ])  # fmt: skip
     assert rows.texts == {0, 4}
     assert "| --- | ---: | ---: | ---: | --- |" in rows.as_markdown()
+
+
+def test_rocking_couples_are_shown_by_axis() -> None:
+    """Three upright cylinders pitch alone; the couple of four in a flat plane is nothing."""
+    pitching = laufruhe.evaluate(laufruhe.load("tractor-three"))
+    whole, by_axis = loads.orders(pitching)
+    assert by_axis.title.startswith("Rocking couple by axis")
+    assert all(row[2].strip() == "0" for row in by_axis.rows)
+    couples = {row[0]: row[-1] for row in whole.rows}
+    assert all(row[1].strip() == couples[row[0]].strip() for row in by_axis.rows if row[0] in ("1", "2"))
+    assert len(loads.orders(laufruhe.evaluate(laufruhe.load("tractor-four-front-force")))) == 1
+
+
+def test_modes_that_no_load_moves_are_named() -> None:
+    (modes, *_) = elastic.modes(laufruhe.evaluate(laufruhe.load("soft-mounts-run-up")))
+    still = [row[0] for row in modes.rows if row[2] == "no"]
+    assert still
+    assert f"No load moves the block in {', '.join(still)}" in modes.note

@@ -43,8 +43,9 @@ class EngineParts(Parts):
         self, name: str | None = None, *, misfire: Sequence[int] | Literal["each"] | None = None,
         cut: Sequence[int] | None = None, cut_valves: Literal["closed", "open"] | None = None,
         speed: Value | None = None, mean_piston_speed: Value | None = None, imep: Value | None = None,
-        bmep: Value | None = None, brake_torque: Value | None = None, motored: bool | None = None,
-        gas: bool | None = None, up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
+        peak_pressure: Value | None = None, intake_pressure: Value | None = None, bmep: Value | None = None,
+        brake_torque: Value | None = None, motored: bool | None = None, gas: bool | None = None,
+        up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
     ) -> Self:
         """Return the engine with an operating point. Speeds and loads at which the engine is looked at."""
         return self._with("operating_points", "operating_point", keys_of(locals()))
@@ -76,7 +77,7 @@ class EngineParts(Parts):
         pressure_column: str | int | Sequence[str | int] | None = None, pressure_unit: str | None = None,
         gauge: bool | None = None, peg: Table | None = None, angle_zero: Number | None = None,
         crankcase_pressure: Value | None = None, cylinder_columns: Sequence[str | int] | None = None,
-        cylinder_angles: Literal["own", "common"] | None = None,
+        motored_column: str | int | None = None, cylinder_angles: Literal["own", "common"] | None = None,
     ) -> Self:
         """Return the engine with gas trace. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_trace", keys_of(locals(), {'model': 'trace'}))
@@ -143,7 +144,8 @@ class EngineParts(Parts):
         return self._with("load_torque", "load_torque", keys_of(locals()))
 
     def flywheel(
-        self, *, inertia: Value | None = None, rim: Table | None = None, crankshaft_inertia: Value | None = None,
+        self, *, inertia: Value | None = None, mass: Value | None = None, mean_diameter: Value | None = None,
+        rim: Table | None = None, crankshaft_inertia: Value | None = None,
     ) -> Self:
         """Return the engine with flywheel. Parts that turn at crank speed, without pistons and rods."""
         return self._with("flywheel", "flywheel", keys_of(locals()))

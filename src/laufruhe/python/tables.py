@@ -72,9 +72,17 @@ def branch(*, on: str, ratio: Number, gear_inertia: Value | None = None, discs: 
 
 def chamber(
     name: str | None = None, *, end: Literal["head", "crank"], bore: Value, cylinders: Sequence[int] | None = None,
-    rod: Value | None = None, steam: Table | None = None, pump: Table | None = None, trace: Table | None = None,
+    rod: Value | None = None, steam: Table | None = None, pump: Table | None = None, compressor: Table | None = None,
+    trace: Table | None = None,
 ) -> Table:
     """Return a table `chamber`. A space on one side of a piston, or of a further piston on the same rod."""
+    return keys_of(locals())
+
+
+def compressor(
+    *, suction: Value, delivery: Value, clearance: Value | None = None, exponent: Value | None = None,
+) -> Table:
+    """Return a table `compressor`. A piston compressor of gas with ideal valves."""
     return keys_of(locals())
 
 
