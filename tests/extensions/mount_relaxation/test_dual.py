@@ -1,5 +1,7 @@
 """A program over cones, by its dual and as told: x and z keep the conditions and meet, whatever was solved before."""
 
+from typing import Any
+
 import clarabel
 import numpy as np
 import pytest
@@ -12,11 +14,17 @@ from laufruhe.extensions.mount_relaxation.cone_solver import (
     column,
     matrix_of,
 )
-from laufruhe.extensions.mount_relaxation.program import RootTerm, SdpProgram, proven_bound
+from laufruhe.extensions.mount_relaxation.program import RootTerm, SdpProgram
 
 SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
 SIZE, COUNT = 3, 4
 ENTRIES = SIZE * (SIZE + 1) // 2
+
+
+def spoilt(cones: ConeProgram, z: np.ndarray, by: float, noise: float, generator: Any) -> np.ndarray:
+    """Multipliers of each cone off by a factor, and by as much as they are large."""
+    parts = np.split(z, np.cumsum([*map(len, cones.right)])[:-1])
+    return np.concatenate([m * generator.uniform(0.0, by) + noise * generator.normal(size=m.shape) for m in parts])
 
 
 class Program:
@@ -94,6 +102,7 @@ def test_a_root_is_proven_above_all_its_lengths() -> None:
     """Three lengths that nothing open changes."""
     rows, none = np.random.default_rng(5).normal(size=(3, 2, 1)), np.zeros(0)
     root = RootTerm(1.0, 0.1, 5.0, ((0, rows),))
-    program = SdpProgram((1,), (none,), 1, 0, np.zeros(1), np.array([np.inf]), (), (), (), (), (root,), ())
-    bound = proven_bound(program, ConeProgram(program).solve(program).multipliers)
+    program = SdpProgram((1,), (none,), 1, 0, np.zeros(1), np.array([25.0]), (), (), (), (), (root,), (), np.zeros(1))
+    cones = ConeProgram(program)
+    bound = cones.solve(cones.cost()).bound
     assert bound == pytest.approx(float(np.linalg.norm(rows[..., 0], axis=1).sum()), rel=1e-4)

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 import pytest
 
+from extensions.mount_relaxation.test_dual import spoilt
 from extensions.mount_relaxation.test_spring_bound import powertrain
-from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Solution
+from laufruhe.extensions.mount_relaxation.cone_solver import column
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints, mode_basis, mode_constraints
 from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
-from laufruhe.extensions.mount_relaxation.program import (
-    ModeMultipliers,
-    SdpMultipliers,
-    SdpProgram,
-    Solution,
-    _mode_bound,
-    proven_bound,
-)
+from laufruhe.extensions.mount_relaxation.program import SdpProgram
 from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.files.reader import load
@@ -94,27 +86,6 @@ def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[
 NEAR = np.array([90e3, 40e3, 110e3, 60e3])
 
 
-def spoilt(found: SdpMultipliers, by: float, noise: float, generator: Any) -> SdpMultipliers:
-    """Multipliers of caps, conditions and modes off by a factor each, and by as much as they are large."""
-
-    def bad(m: np.ndarray) -> np.ndarray:
-        return m * generator.uniform(0.0, by) + noise * generator.normal(size=m.shape)
-
-    shapes = [
-        ModeMultipliers(
-            [bad(m) for m in own.matrices], bad(own.sides), bad(own.equal), bad(own.corners),
-            [(bad(first), bad(second)) for first, second in own.signs],
-        )
-        for own in found.modes
-    ]  # fmt: skip
-    return replace(
-        found,
-        quadratics=[bad(m) for m in found.quadratics],
-        constraints=[bad(m) for m in found.constraints],
-        modes=shapes,
-    )
-
-
 def test_sides_hold_whatever_a_solver_proposes() -> None:
     """Least s and least w of all designs that are better than one, by multipliers at random too."""
     problem, generator = decoupled(4), np.random.default_rng(11)
@@ -127,17 +98,23 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
     half = 0.5 * (boxes.upper - boxes.lower)
     inside = [x for x, value in designs if value <= 1.1 * minimum]
     for number in (0, 2):
-        own: SdpProgram = replace(program, objective=np.eye(program.numbers + 10)[number])
-        told: Solution = stated.solve(own)
+        cost = stated.cost(np.eye(program.numbers + 10)[number])
+        told = stated.solve(cost)
         side = mounts.single_decisions[number]
         assert side is not None
         smallest = min((x[side] - 0.5 * (boxes.lower + boxes.upper)[side]) / half[side] for x in inside)
-        assert -1.01 <= proven_bound(own, told.multipliers) <= smallest
+        assert -1.01 <= told.bound <= smallest
         # by the solver of the aim before, as exactly as it is worth
         proven, spring_mounts = stated.minimum(np.eye(program.numbers + 10)[number])
-        assert proven_bound(own, told.multipliers) - 0.05 < proven <= min(smallest, spring_mounts[number] + 0.05)
+        assert told.bound - 0.05 < proven <= min(smallest, spring_mounts[number] + 0.05)
         for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
-            assert proven_bound(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
+            assert stated.bound(cost, spoilt(stated, told.z, by, noise, generator)) <= smallest
+
+
+def of_mode(mode: ModeConstraints, count: int) -> SdpProgram:
+    """A program of one mode and numbers alone."""
+    none = np.zeros(0)
+    return SdpProgram((1,), (none,), count, 0, none, none, (), (), (), (), (), (mode,), np.zeros(count))
 
 
 @pytest.mark.parametrize("size", [1.0, 0.1, 0.0])
@@ -150,23 +127,18 @@ def test_the_bound_of_a_mode_is_under_its_lagrangian(size: float) -> None:
             (0.5 * (square + square.transpose(1, 0, 2, 3, 4)),), r.normal(size=(4, 1 + count, d, d)),
             r.normal(size=(2, 1 + count, d, d)),
         )  # fmt: skip
-        price = r.normal(size=(3, 3))
-        price = size * price @ price.T
-        signs = [tuple(m @ m.T for m in size * r.normal(size=(2, d, d))) for _ in range(count)]
-        told = ModeMultipliers(
-            [price], size * r.random(4), size * r.normal(size=2), size * r.normal(size=count), signs
-        )  # fmt: skip
-        slope, values = r.normal(size=d - 1), []
-        bound = _mode_bound(mode, told, slope)
+        cones = ConeProgram(of_mode(mode, count))
+        told, slope = size * r.normal(size=sum(map(len, cones.right))), r.normal(size=count + d - 1)
+        cost = cones.cost(slope)
+        bound, z = cones.bound(cost, told), cones._in_dual_cones(told)
+        values = []
         for w, s in zip(r.normal(size=(200, d - 1)), r.uniform(-1.0, 1.0, (200, count)), strict=True):
-            z = np.append(1.0, w / np.linalg.norm(w))
-            moments = np.outer(z, z) * np.append(1.0, s)[:, None, None]
-            values.append(
-                slope @ z[1:] + told.corners @ s + told.equal @ np.einsum("nmxy,mxy->n", mode.equal, moments)
-                - told.sides @ np.einsum("nmxy,mxy->n", mode.sides, moments)
-                - np.sum(price * np.einsum("mabxy,mxy->ab", np.moveaxis(mode.matrices[0], 2, 0), moments))
-            )  # fmt: skip
-        assert bound <= min(values)
+            shape = np.append(1.0, w / np.linalg.norm(w))
+            moments = np.outer(shape, shape) * np.append(1.0, s)[:, None, None]
+            x = np.concatenate([s, [1.0], column(moments).ravel()])
+            assert cost @ x == pytest.approx(slope @ np.append(s, shape[1:]))
+            values.append(cost @ x + z @ (cones._matrix @ x - np.concatenate(cones.right)))
+        assert bound <= min(values) + 1e-9
 
 
 @pytest.mark.slow
@@ -183,3 +155,32 @@ def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly(
             assert np.all((found[0][:4] <= x) & (x <= found[1][:4]))
     assert np.prod((found[1] - found[0])[:4] / (boxes.upper - boxes.lower)[:4]) < 0.5
     assert 0.0 < spring_bound(problem, minimum, 0.1 * minimum, best.tolist()).bound <= minimum
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
+    """Nothing mode_scores where all are; what those of s and those of w add is never taken off each other."""
+    rng, numbers, d = np.random.default_rng(seed), 3, 6
+    shapes = ModeConstraints((), rng.normal(size=(4, 1 + numbers, d, d)), rng.normal(size=(2, 1 + numbers, d, d)))
+    cones = ConeProgram(of_mode(shapes, numbers))
+    prices = rng.normal(size=sum(map(len, cones.right)))
+    s, z = rng.uniform(-1.0, 1.0, numbers), np.concatenate([[1.0], rng.normal(size=d - 1)])
+
+    def moments(own: float, crossed: float) -> np.ndarray:
+        plain, mixed = rng_of.normal(size=(d, d)), rng_of.normal(size=(numbers, d, d))
+        plain[0] = plain[:, 0] = 0.0
+        first = np.outer(z, z) + own * (plain + plain.T)
+        return np.concatenate([first[None], s[:, None, None] * first + crossed * (mixed + mixed.swapaxes(1, 2))])
+
+    pulled = []
+    for own, crossed in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
+        rng_of = np.random.default_rng(seed + 10)
+        (told,) = cones.mode_scores(Solution(0.0, s, (), (moments(own, crossed),), prices))
+        pulled.append(told)
+    none, plain, mixed, both = pulled
+    for k in range(2):
+        assert np.all(none[k] < 1e-9)
+        np.testing.assert_allclose(both[k], plain[k] + mixed[k], rtol=1e-9, atol=1e-12)
+        assert np.all(mixed[k] > 0.0)
+    assert np.all(plain[0] < 1e-9)
+    assert np.all(plain[1] > 0.0)

@@ -11,22 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from extensions.mount_relaxation.test_dual import spoilt
 from lanes import first_fast
 from laufruhe.extensions.mount_relaxation import orders as orders_
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
 from laufruhe.extensions.mount_relaxation.constraints import moment_constraints
-from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.extensions.mount_relaxation.odd_multiples import HighOrder, linear_sum, work_weight
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, is_lifted, open_mounts
 from laufruhe.extensions.mount_relaxation.orders import Order
 from laufruhe.extensions.mount_relaxation.parameter_maps import mount_axes
-from laufruhe.extensions.mount_relaxation.program import (
-    ModeMultipliers,
-    SdpMultipliers,
-    SdpProgram,
-    Solution,
-    mode_scores,
-)
 from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
 from laufruhe.extensions.mount_relaxation.response import ResponseBound, response_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
@@ -424,29 +417,15 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
     # roots of a mean narrow each other on the whole of what is divided
     boxes.lower, boxes.upper = low, high
 
-    right = ConeProgram.solve
+    right = ConeProgram.bound
 
-    def spoilt(by: float, noise: float) -> Any:
-        def wrong(self: ConeProgram, program: SdpProgram) -> Solution:
-            solution = right(self, program)
-            told = solution.multipliers
-
-            def bad(m: np.ndarray) -> np.ndarray:
-                return m * generator.uniform(0.0, by) + noise * generator.normal(size=m.shape)
-
-            parts = ([bad(m) for m in own] for own in (told.quadratics, told.constraints, told.links))
-            quadratics, constraints, links = parts
-            along = [[bad(each) for each in own] for own in told.lengths]
-            roots = bad(told.chords), along, float(generator.uniform(0.0, by) * told.limit + noise)
-            linear = bad(told.linear), bad(told.sets)
-            return replace(solution, multipliers=SdpMultipliers(quadratics, constraints, *linear, links, *roots))
-
-        return wrong
+    def wrong_by(by: float, noise: float) -> Any:
+        return lambda self, cost, z: right(self, cost, spoilt(self, z, by, noise, generator))
 
     # of several orders every one is bounded by itself, so that one way to be wrong is many
-    ways = (spoilt(2.0, 1e-3), spoilt(2.0, 0.0), spoilt(0.0, 0.0), spoilt(0.0, 1.0))
+    ways = (wrong_by(2.0, 1e-3), wrong_by(2.0, 0.0), wrong_by(0.0, 0.0), wrong_by(0.0, 1.0))
     for wrong in ways[: 1 if name == "means" else 4]:
-        monkeypatch.setattr(ConeProgram, "solve", wrong)
+        monkeypatch.setattr(ConeProgram, "bound", wrong)
         boxes._reset()
         assert boxes.relax(low, high)[0] <= minimum
 
@@ -625,33 +604,6 @@ def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_all
             assert true <= over * (1.0 + 1e-9)
             assert over <= true * 1.0001 or mounts is PLACES
             assert over < 60.0 * true
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
-    """Nothing mode_scores where all are; what those of s and those of w add is never taken off each other."""
-    rng, numbers, d = np.random.default_rng(seed), 3, 6
-    shapes = ModeConstraints((), rng.normal(size=(4, 1 + numbers, d, d)), rng.normal(size=(2, 1 + numbers, d, d)))
-    found = ModeMultipliers((), rng.random(4), rng.normal(size=2), np.zeros((numbers, d)), ())
-    s, z = rng.uniform(-1.0, 1.0, numbers), np.concatenate([[1.0], rng.normal(size=d - 1)])
-
-    def moments(own: float, crossed: float) -> np.ndarray:
-        plain, mixed = rng_of.normal(size=(d, d)), rng_of.normal(size=(numbers, d, d))
-        plain[0] = plain[:, 0] = 0.0
-        first = np.outer(z, z) + own * (plain + plain.T)
-        return np.concatenate([first[None], s[:, None, None] * first + crossed * (mixed + mixed.swapaxes(1, 2))])
-
-    pulled = []
-    for own, crossed in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
-        rng_of = np.random.default_rng(seed + 10)
-        pulled.append(mode_scores(shapes, found, s, moments(own, crossed)))
-    none, plain, mixed, both = pulled
-    for k in range(2):
-        assert np.all(none[k] < 1e-9)
-        np.testing.assert_allclose(both[k], plain[k] + mixed[k], rtol=1e-9, atol=1e-12)
-        assert np.all(mixed[k] > 0.0)
-    assert np.all(plain[0] < 1e-9)
-    assert np.all(plain[1] > 0.0)
 
 
 def test_a_place_behind_the_middle_is_narrowed_at_both_ends(tmp_path: Path) -> None:

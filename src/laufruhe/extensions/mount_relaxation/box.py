@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Objectives
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Objectives, Solution
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint, moment_constraints
 from laufruhe.extensions.mount_relaxation.limits import UNBOUNDED
 from laufruhe.extensions.mount_relaxation.modes import mode_constraints
@@ -23,13 +23,9 @@ from laufruhe.extensions.mount_relaxation.odd_multiples import (
 from laufruhe.extensions.mount_relaxation.orders import EpigraphVariable, MeasureOrders, Order
 from laufruhe.extensions.mount_relaxation.program import (
     LinearLimit,
-    ObjectiveLimit,
     QuadraticBound,
     RootTerm,
     SdpProgram,
-    Solution,
-    mode_scores,
-    proven_bound,
 )
 from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, squared
 from laufruhe.numerics.arrays import Array, Mask
@@ -206,24 +202,20 @@ class BoxRelaxation:
         # the solver works best if prices add up to one
         scale = float(prices.sum())
         program, responses = self._program(variables, prices / scale, mean)
-        if mean is not None:
-            program = replace(program, objective=np.append(mean.slopes / scale, np.zeros(5 * len(self.modes))))
-        solution = ConeProgram(program).solve(program)
+        cones = ConeProgram(program)
+        solution = cones.solve(cones.cost())
         self._solution_s = solution.s
         orders = [order for variable in variables for order in variable.orders]
-        scores = self._branching_scores(orders, responses, solution)
-        return scale * proven_bound(program, solution.multipliers), scores
+        return scale * solution.bound, self._branching_scores(orders, responses, solution, cones.mode_scores(solution))
 
     def cut_off(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> SdpProgram:
         """Return the semidefinite program of designs in the box with a norm up to `upper_norm`."""
         if _is_single(variables):
-            uppers = [(v.root_bound(self.upper_norm / v.share) / v.unit) ** 2 for v in variables]
-            program, _ = self._program(variables, np.zeros(len(variables)))
-            return replace(program, uppers=np.append(uppers, program.uppers[len(uppers) :]))
+            return self._program(variables, np.zeros(1))[0]
         mean = self._mean(variables, root_bounds)
         scale = float(mean.prices.sum())
         program, _ = self._program(variables, mean.prices / scale, mean)
-        return replace(program, limit=ObjectiveLimit(mean.slopes / scale, (self.upper_norm - mean.constant) / scale))
+        return replace(program, limit=(self.upper_norm - mean.constant) / scale)
 
     def _program(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
@@ -256,7 +248,11 @@ class BoxRelaxation:
                 lengths = variable.lengths(self.query, variable_responses, numbers)
                 lower, upper = float(mean.lower[number]), float(mean.upper[number])
                 roots.append(RootTerm(prices[number], lower, upper, lengths))
-        uppers, ratios = [math.inf] * len(variables), list[LinearLimit]()
+        if mean is None:
+            uppers = [(v.root_bound(self.upper_norm / v.share) / v.unit) ** 2 for v in variables]
+        else:
+            uppers = (mean.upper**2).tolist()
+        ratios: list[LinearLimit] = []
         for limit in self.search.limits.norms:
             for variable in limit.variables:
                 numbers = [number_of(o, limit.query.bound(o, variable, limit.upper)) for o in variable.orders]
@@ -276,10 +272,14 @@ class BoxRelaxation:
             self.mounts.numbers, responses[0].columns,
             np.append(0.0 * prices if roots else prices, np.zeros(len(uppers) - len(variables))), np.array(uppers),
             quadratics, constraints, ratios, self.search.basis.sets, roots, self.modes,
+            np.zeros(self.mounts.numbers) if mean is None else mean.slopes / mean.prices.sum(),
         )  # fmt: skip
         return program, responses
 
-    def _branching_scores(self, orders: Sequence[Order], responses: Sequence[Response], solution: Solution) -> Array:
+    def _branching_scores(
+        self, orders: Sequence[Order], responses: Sequence[Response], solution: Solution,
+        mode_scores: Sequence[tuple[Array, Array]],
+    ) -> Array:  # fmt: skip
         """Return a branching score of each side of the box, shape (n,).
 
         It adds up squared violations of the products with s at the optimum, over the squared signal in the norm. Sides
@@ -297,10 +297,7 @@ class BoxRelaxation:
             for place, (loads, shifted) in zip(mounts.places, response.places, strict=True):
                 violation = place.force_scaled(shifted - s[place.number] * loads, order.omega)
                 self._score(scores, [place.number], max(float(np.sum(squared(violation) * moments)), 0.0) / size)
-        for mode, mode_multipliers, sides, moments in zip(
-            self.modes, solution.multipliers.modes, self.search.mode_sides, solution.modes, strict=True
-        ):
-            number_scores, side_scores = mode_scores(mode, mode_multipliers, s, moments)
+        for (number_scores, side_scores), sides in zip(mode_scores, self.search.mode_sides, strict=True):
             scores[sides] += side_scores
             for j, share in enumerate(number_scores):
                 self._score(scores, [j], float(share))

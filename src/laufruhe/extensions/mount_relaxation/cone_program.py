@@ -1,4 +1,7 @@
-"""Statement of the relaxation (E43-E45, E52-E54) as a cone program; any multipliers of it prove valid bounds.
+"""Statement of the relaxation (E43-E45, E52-E54) as a cone program; any multipliers of it prove valid bounds (E44).
+
+For a program min q' x with b - A x in cones K, any z in the dual cones gives q' x >= (q + A' z)' x - b' z. Every design
+has variables x within known bounds and moments of known size, so that the right side has a minimum in closed form.
 
 Several objectives under the same constraints are bounded by one program; worker processes may bound them ahead.
 """
@@ -8,29 +11,26 @@ from __future__ import annotations
 import math
 import pickle
 import threading
-from collections import defaultdict
 from collections.abc import Hashable, Iterable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from typing import Any, TypeAlias
 from uuid import uuid4
 
 import numpy as np
-from scipy.sparse import coo_array, vstack
+from scipy.sparse import coo_array, csc_array, vstack
 
 from laufruhe.extensions.mount_relaxation.cone_solver import Cone, ConeSolver, column, matrix_of, triangle
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.extensions.mount_relaxation.program import (
-    ModeMultipliers,
     QuadraticBound,
     RootTerm,
-    SdpMultipliers,
     SdpProgram,
-    Solution,
-    proven_bound,
+    least_in_ball,
+    least_quadratic,
 )
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.workers import Speculation, speculation
@@ -61,6 +61,17 @@ _Step: TypeAlias = tuple[str, bytes, Array | int]
 Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
 
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Proven bound, shared numbers s, moments of orders and of modes, and the solver's multipliers of all rows."""
+
+    bound: float
+    s: Array
+    moments: Sequence[Array]
+    modes: Sequence[Array]
+    z: Array
+
+
 class ConeProgram:
     """Cone program of an `SdpProgram`, built up row by row of its cones.
 
@@ -73,7 +84,8 @@ class ConeProgram:
         self._settings = {**_SETTINGS, **dict(zip(("tol_gap_rel", "tol_feas"), tolerances, strict=True))}
         self.rows: list[Any] = []
         self.right: list[Array] = []
-        self.cones: list[tuple[str, Hashable]] = []
+        self.cones: list[str] = []
+        self._of_products: list[bool] = []
         blocks = [_entries(size) for quadratic in program.quadratics for size in quadratic.blocks]
         self.blocks = np.cumsum([len(program.prices), *blocks])
         counts = [1 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
@@ -92,21 +104,32 @@ class ConeProgram:
             self._add_constraint(constraint)
         for number, root in enumerate(program.roots):
             self._add_root(number, root)
-        if program.limit is not None:
+        if program.limit < math.inf:
             columns = np.concatenate([self.roots[:-1], self.first + np.arange(program.numbers)])
-            block = np.concatenate([[root.price for root in program.roots], program.limit.slopes])[None]
-            self._add(block, columns.astype(np.intp), SIDES, "limit", np.array([program.limit.upper]))
+            block = np.concatenate([[root.price for root in program.roots], program.slopes])[None]
+            self._add(block, columns.astype(np.intp), SIDES, np.array([program.limit]))
         for number, mode in enumerate(program.modes):
             self._add_mode(number, mode)
+        self._matrix = csc_array(vstack(self.rows))
+        # bounds of all variables but moments; a trace bounds the entries of its blocks
+        blocks_up = [np.full(sum(map(_entries, q.blocks)), program.uppers[q.variable]) for q in program.quadratics]
+        roots_up = [np.full(count, root.upper) for root, count in zip(program.roots, counts, strict=True)]
+        roots_low = [
+            np.append(root.lower, np.zeros(count - 1)) for root, count in zip(program.roots, counts, strict=True)
+        ]
+        ones, none = np.ones(program.numbers), np.zeros(len(program.uppers))
+        self._uppers = np.concatenate([program.uppers, *blocks_up, *roots_up, ones])
+        self._lowers = np.concatenate([none, *(-part for part in blocks_up), *roots_low, -ones])
 
     def _add(
-        self, block: Array, columns: Indices, cone: str, name: Hashable = None, right: Array | None = None
+        self, block: Array, columns: Indices, cone: str, right: Array | None = None, of_product: bool = False
     ) -> None:
         row, place = np.nonzero(block)
         shape = len(block), int(self.modes[-1])
         self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
         self.right.append(np.zeros(len(block)) if right is None else np.asarray(right, dtype=float))
-        self.cones.append((cone, name))
+        self.cones.append(cone)
+        self._of_products.append(of_product)
 
     def _add_mode(self, number: int, mode: ModeConstraints) -> None:
         """Add the rows of the constraints E56 of one natural mode."""
@@ -116,23 +139,19 @@ class ConeProgram:
         self._add(np.ones((1, 1)), corners[:1], ZERO, right=np.ones(1))
         difference = np.concatenate([np.eye(numbers), -np.eye(numbers)], axis=1)
         columns = np.concatenate([corners[1:], self.first + np.arange(numbers)])
-        self._add(difference, columns, ZERO, ("corners", number))
-        for name, matrices, cone in (("equal", mode.equal, ZERO), ("sides", mode.sides, SIDES)):
-            self._add(-column(matrices).reshape(len(matrices), -1), mode_columns, cone, (name, number))
+        self._add(difference, columns, ZERO, of_product=True)
+        for matrices, cone in ((mode.equal, ZERO), (mode.sides, SIDES)):
+            self._add(-column(matrices).reshape(len(matrices), -1), mode_columns, cone)
         for tensor in mode.matrices:
             i, j, factor = triangle(tensor.shape[1])
             rows = column(tensor[:, i, j]).transpose(1, 0, 2).reshape(len(i), -1) * factor[:, None]
-            self._add(-rows, mode_columns, MATRIX, ("matrices", number))
+            self._add(-rows, mode_columns, MATRIX)
         first = np.arange(entries)
         for k in range(1, 1 + numbers):
             for sign in (1.0, -1.0):
                 rows = np.concatenate([-np.eye(entries), -sign * np.eye(entries)], axis=1)
-                self._add(
-                    rows,
-                    np.concatenate([mode_columns[first], mode_columns[k * entries + first]]),
-                    MATRIX,
-                    (sign, number),
-                )
+                columns = np.concatenate([mode_columns[first], mode_columns[k * entries + first]])
+                self._add(rows, columns, MATRIX, of_product=True)
 
     def _add_links(self) -> None:
         sizes = self.program.sizes
@@ -140,7 +159,7 @@ class ConeProgram:
         corner, count = self._corner(0), _entries(1 + self.program.columns) - 1
         for order in range(1, len(sizes) if count else 1):
             difference = np.concatenate([-np.eye(count), np.eye(count)], axis=1)
-            self._add(difference, np.concatenate([corner[1:], self._corner(order)[1:]]), ZERO, "links")
+            self._add(difference, np.concatenate([corner[1:], self._corner(order)[1:]]), ZERO)
 
     def _corner(self, order: int) -> Indices:
         return np.asarray(self.ends[order] + np.arange(_entries(1 + self.program.columns)))
@@ -152,14 +171,13 @@ class ConeProgram:
         """Add the linear constraints: ranges of numbers s, sets of unbalances, limits, bounds, block traces."""
         program, numbers = self.program, self.program.numbers
         for sign in (1.0, -1.0):
-            self._add(sign * np.eye(numbers), self.first + np.arange(numbers), SIDES, right=np.ones(numbers))
+            self._add(sign * np.eye(numbers), self.first + np.arange(numbers), SIDES, np.ones(numbers))
         for matrix in program.sets:
-            self._add(column(matrix)[None], self._corner(0), SIDES, "sets")
+            self._add(column(matrix)[None], self._corner(0), SIDES)
         for linear in program.linear:
             columns = np.concatenate([self._moment(order) for order, _ in linear])
-            self._add(np.concatenate([column(matrix) for _, matrix in linear])[None], columns, SIDES, "linear")
-        bounded = np.flatnonzero(np.isfinite(program.uppers))
-        self._add(np.eye(len(bounded)), bounded, SIDES, right=program.uppers[bounded])
+            self._add(np.concatenate([column(matrix) for _, matrix in linear])[None], columns, SIDES)
+        self._add(np.eye(len(program.uppers)), np.arange(len(program.uppers)), SIDES, program.uppers)
         block_number = 0
         for quadratic in program.quadratics:
             if quadratic.blocks:
@@ -188,7 +206,7 @@ class ConeProgram:
         else:
             blocks.append(-column(np.eye(quadratic.size))[:, None])
             columns.append(np.array([quadratic.variable]))
-        self._add(np.concatenate(blocks, axis=1), np.concatenate(columns), MATRIX, "quadratics")
+        self._add(np.concatenate(blocks, axis=1), np.concatenate(columns), MATRIX)
 
     def _add_root(self, number: int, root: RootTerm) -> None:
         """Add the constraints of a root: it is above its chord and above the sum of its length variables (E58).
@@ -197,7 +215,7 @@ class ConeProgram:
         """
         at, end = int(self.roots[number]), int(self.roots[number + 1])
         ends = np.array([number, at])
-        self._add(np.array([[root.slope, -1.0]]), ends, SIDES, "chords", np.array([-root.offset]))
+        self._add(np.array([[root.slope, -1.0]]), ends, SIDES, np.array([-root.offset]))
         sums = np.concatenate([[-1.0], np.ones(end - at - 1)])[None]
         self._add(sums, np.arange(at, end), SIDES)
         for order, rows in root.rows:
@@ -209,83 +227,97 @@ class ConeProgram:
                 first = self.ends[order] + np.cumsum(np.arange(size))
                 # entries off the diagonal are scaled by the root of two
                 block[1:, 2:] *= math.sqrt(0.5)
-                self._add(block, np.concatenate([[at], first]), LENGTH, ("lengths", number))
+                self._add(block, np.concatenate([[at], first]), LENGTH)
 
     def _add_constraint(self, constraint: MomentConstraint) -> None:
         i, j, factor = triangle(constraint.size)
         moments = -column(constraint.moments[i, j]) * factor[:, None]
         columns = np.concatenate([self.first + np.arange(self.program.numbers), self._moment(constraint.order)])
         block = np.concatenate([-column(constraint.slopes).T.reshape(len(i), -1), moments], axis=1)
-        self._add(block, columns, MATRIX, "constraints", column(constraint.constant))
+        self._add(block, columns, MATRIX, column(constraint.constant))
+
+    def cost(self, objective: Array | int | None = None) -> Array:
+        """Return the coefficients of an objective: that of the program, or as in `minimum`."""
+        program, cost = self.program, np.zeros(int(self.modes[-1]))
+        if objective is None:
+            cost[: len(program.prices)] = program.prices
+            cost[self.roots[:-1]] = [root.price for root in program.roots]
+            objective = np.append(program.slopes, np.zeros(5 * len(program.modes)))
+        if isinstance(objective, int):
+            cost[self.roots[objective]] = 1.0
+            return cost
+        cost[self.first : self.first + program.numbers] = objective[: program.numbers]
+        for start, slope in zip(self.modes, objective[program.numbers :].reshape(-1, 5), strict=False):
+            # entries (0, k) of a triangle, which are scaled by the root of two
+            cost[start + np.cumsum(np.arange(1, 6))] = slope * math.sqrt(0.5)
+        return cost
 
     def minimum(self, objective: Array | int) -> tuple[float, Array]:
         """Return the proven minimum of an objective, and the numbers s and mode coordinates w at the optimum.
 
-        An integer `objective` is the number of the root to minimise.
+        An integer `objective` is the number of the root to minimise. An array has the slopes by s, then by w of each
+        mode, shape (numbers + 5 modes,).
         """
-        if isinstance(objective, int):
-            assert self.program.limit is not None
-            program = replace(self.program, limit=replace(self.program.limit, root=objective))
-        else:
-            program = replace(self.program, objective=objective)
-        solution = self.solve(program)
-        modes = [moments[0, 0, 1:] for moments in solution.modes]
-        return proven_bound(program, solution.multipliers), np.concatenate([solution.s, *modes])
+        solution = self.solve(self.cost(objective))
+        return solution.bound, np.concatenate([solution.s, *(moments[0, 0, 1:] for moments in solution.modes)])
 
-    def solve(self, program: SdpProgram) -> Solution:
-        """Return multipliers and moments of a program with the same constraints, whatever the solver's status."""
-        x, z = self._solver.solve(self._cost(program))
-        parts: defaultdict[Hashable, list[Array]] = defaultdict(list)
-        for (_, name), part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
-            parts[name].append(part)
-        lengths = []
-        for number, root in enumerate(program.roots):
-            # vectors of the second-order cones without their first entry, order by order
-            vectors = iter(parts["lengths", number])
-            lengths.append([-np.array([next(vectors)[1:] for _ in rows]) for _, rows in root.rows])
-        mode_multipliers = []
-        for number, mode in enumerate(program.modes):
-            matrices = [
-                matrix_of(part, len(t[0])) for part, t in zip(parts["matrices", number], mode.matrices, strict=True)
-            ]
-            signs = [[matrix_of(part, 6) for part in parts[sign, number]] for sign in (1.0, -1.0)]
-            (sides,), (equal,), (corners,) = (parts[name, number] for name in ("sides", "equal", "corners"))
-            mode_multipliers.append(ModeMultipliers(matrices, sides, -equal, corners, [*zip(*signs, strict=True)]))
-        multipliers = SdpMultipliers(
-            [matrix_of(part, bound.size) for part, bound in zip(parts["quadratics"], program.quadratics, strict=True)],
-            [
-                matrix_of(part, constraint.size)
-                for part, constraint in zip(parts["constraints"], program.constraints, strict=True)
-            ],
-            _joined(parts["linear"]),
-            _joined(parts["sets"]),
-            [matrix_of(np.append(0.0, part), 1 + program.columns) for part in parts["links"]],
-            _joined(parts["chords"]),
-            lengths,
-            float(sum(part[0] for part in parts["limit"])),
-            mode_multipliers,
-        )
-        moments = [matrix_of(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
-        modes = []
-        for start, end in zip(self.modes[:-1], self.modes[1:], strict=True):
-            entries = x[start:end].reshape(1 + program.numbers, -1)
-            modes.append(np.array([matrix_of(entries_of_matrix, 6) for entries_of_matrix in entries]))
-        s = np.clip(x[self.first : self.first + program.numbers], -1.0, 1.0)
-        return Solution(multipliers, s, moments, modes)
+    def solve(self, cost: Array) -> Solution:
+        """Return the proven minimum of the objective with coefficients `cost`, whatever the solver's status."""
+        squares = np.zeros(len(cost))
+        for order, size in enumerate(self.program.sizes):
+            squares[self._moment(order)] = SQUARE_PRICE * _diagonal(size)
+        x, z = self._solver.solve(cost - squares)
+        moments = [matrix_of(x[self._moment(k)], size) for k, size in enumerate(self.program.sizes)]
+        s = np.clip(x[self.first : self.first + self.program.numbers], -1.0, 1.0)
+        return Solution(self.bound(cost, z), s, moments, self._mode_matrices(x), z)
 
-    def _cost(self, program: SdpProgram) -> Array:
-        cost = np.zeros(int(self.modes[-1]))
-        cost[: len(program.prices)] = program.prices
-        for number, (start, root) in enumerate(zip(self.roots, program.roots, strict=False)):
-            cost[start] = root.price if program.limit is None else float(number == program.limit.root)
-        slopes, mode_slopes = program.slopes
-        cost[self.first : self.first + program.numbers] = slopes
-        for start, slope in zip(self.modes, mode_slopes, strict=False):
-            # entries (0, k) of a triangle, which are scaled by the root of two
-            cost[start + np.cumsum(np.arange(1, 6))] = slope * math.sqrt(0.5)
-        for order, size in enumerate(program.sizes):
-            cost[self._moment(order)] = -SQUARE_PRICE * _diagonal(size)
-        return cost
+    def bound(self, cost: Array, z: Array) -> float:
+        """Return the lower bound of an objective that multipliers `z` of the rows prove, for any `z` (E44, E56)."""
+        z = self._in_dual_cones(z)
+        remainder = cost + self._matrix.T @ z
+        numbers = remainder[: len(self._uppers)]
+        bound = float(np.minimum(numbers * self._lowers, numbers * self._uppers).sum() - np.concatenate(self.right) @ z)
+        for order, (size, reaches) in enumerate(zip(self.program.sizes, self.program.reaches, strict=True)):
+            bound += least_quadratic(matrix_of(remainder[self._moment(order)], size), reaches)
+        for matrices in self._mode_matrices(remainder):
+            # each s_j with its worse sign
+            values, vectors = np.linalg.eigh(matrices[1:])
+            worst = np.einsum("jab,jb,jcb->ac", vectors, np.abs(values), vectors)
+            bound += least_in_ball(matrices[0] - worst, 1.0)
+        return bound
+
+    def mode_scores(self, solution: Solution) -> list[tuple[Array, Array]]:
+        """Return branching scores of the numbers s, shape (numbers,), and of the coordinates w, (5,), by each mode.
+
+        A score is the violation of products at the optimum, times its multipliers.
+        """
+        z = np.where(np.repeat(self._of_products, [*map(len, self.right)]), 0.0, self._in_dual_cones(solution.z))
+        scores = []
+        for remainder, moments in zip(self._mode_matrices(self._matrix.T @ z), solution.modes, strict=True):
+            violations = moments[1:] - solution.s[:, None, None] * moments[0]
+            priced = np.abs(np.einsum("jab,jab->jb", remainder[1:], violations))
+            corner = moments[0][0]
+            squares = np.abs(np.einsum("ab,ab->b", remainder[0], moments[0] - np.outer(corner, corner)))
+            scores.append((priced.sum(axis=1), np.asarray((priced.sum(axis=0) + squares)[1:])))
+        return scores
+
+    def _in_dual_cones(self, z: Array) -> Array:
+        parts = []
+        for cone, part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
+            if cone == SIDES:
+                part = np.maximum(part, 0.0)
+            elif cone == LENGTH:
+                part = np.append(max(part[0], float(np.linalg.norm(part[1:]))), part[1:])
+            elif cone == MATRIX:
+                values, vectors = np.linalg.eigh(matrix_of(part, math.isqrt(2 * len(part))))
+                part = column((vectors * np.maximum(values, 0.0)) @ vectors.T)
+            parts.append(part)
+        return np.concatenate(parts)
+
+    def _mode_matrices(self, x: Array) -> list[Array]:
+        # matrices of Z and all Z_j by mode, shape (1 + numbers, 6, 6)
+        shape = len(self.program.modes), 1 + self.program.numbers, _entries(6)
+        return [np.array([matrix_of(part, 6) for part in parts]) for parts in x[self.modes[0] :].reshape(shape)]
 
     @cached_property
     def _solver(self) -> ConeSolver:
@@ -294,7 +326,7 @@ class ConeProgram:
 
         kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
         cones = []
-        for (cone, _), right in zip(self.cones, self.right, strict=True):
+        for cone, right in zip(self.cones, self.right, strict=True):
             size = len(right)
             if cone == MATRIX:
                 # rows of the matrix from the size of its triangle
@@ -302,8 +334,7 @@ class ConeProgram:
             else:
                 cones.append(Cone(size, None if cone == ZERO else kinds[cone](size), cone == LENGTH))
         moments = [(self._moment(k), clarabel.PSDTriangleConeT(size)) for k, size in enumerate(self.program.sizes)]
-        rows, right = vstack(self.rows, format="coo"), np.concatenate(self.right)
-        return ConeSolver(rows, right, cones, moments, self._settings)
+        return ConeSolver(self._matrix.tocoo(), np.concatenate(self.right), cones, moments, self._settings)
 
 
 class _Cache(threading.local):
@@ -355,10 +386,6 @@ class Objectives:
             self._ahead.prefetch(
                 ((self._name, key), (self._name, self._program, objective)) for key, objective in objectives
             )
-
-
-def _joined(parts: Sequence[Array]) -> Array:
-    return np.concatenate([np.zeros(0), *parts])
 
 
 def _entries(size: int) -> int:
