@@ -128,8 +128,8 @@ def test_a_cone_solver_that_gives_up_is_asked_how_near_the_limits_can_be_met(tmp
 
 
 def test_a_solver_without_numbers_leaves_a_design_and_no_traceback(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("laufruhe.solvers.mounts.cones.ATTEMPTS", ())
-    monkeypatch.setattr("laufruhe.solvers.mounts.cones.TIGHT", {"max_iter": 1})
+    monkeypatch.setattr("laufruhe.solvers.mounts.convex.ATTEMPTS", ())
+    monkeypatch.setattr("laufruhe.solvers.mounts.convex.TIGHT", {"max_iter": 1})
     text = CONTRADICTION.replace("0.828998", "5.0").replace("5.49398 Hz", "1 Hz")
     result = solve(problem_of(tmp_path, text))
     assert result.status == "feasible"

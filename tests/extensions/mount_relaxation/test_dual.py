@@ -11,10 +11,9 @@ from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
 from laufruhe.extensions.mount_relaxation.cone_solver import (
     Cone,
     ConeSolver,
-    column,
-    matrix_of,
 )
 from laufruhe.extensions.mount_relaxation.program import RootTerm, SdpProgram
+from laufruhe.prove.mounts.dual_cones import column, matrix_of
 
 SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
 SIZE, COUNT = 3, 4

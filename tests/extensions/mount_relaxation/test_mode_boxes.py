@@ -8,7 +8,6 @@ import pytest
 from extensions.mount_relaxation.test_dual import spoilt
 from extensions.mount_relaxation.test_spring_bound import powertrain
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Solution
-from laufruhe.extensions.mount_relaxation.cone_solver import column
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints, mode_basis, mode_constraints
 from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
 from laufruhe.extensions.mount_relaxation.program import SdpProgram
@@ -18,6 +17,7 @@ from laufruhe.files.reader import load
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.mounts.dual_cones import column, in_dual_cones
 
 DECOUPLED = {"limit": "kinetic-energy decoupling", "motions": ["bounce", "roll"], "min": "0.5"}
 
@@ -130,7 +130,7 @@ def test_the_bound_of_a_mode_is_under_its_lagrangian(size: float) -> None:
         cones = ConeProgram(of_mode(mode, count))
         told, slope = size * r.normal(size=sum(map(len, cones.right))), r.normal(size=count + d - 1)
         cost = cones.cost(slope)
-        bound, z = cones.bound(cost, told), cones._in_dual_cones(told)
+        bound, z = cones.bound(cost, told), in_dual_cones(told, cones.cones)
         values = []
         for w, s in zip(r.normal(size=(200, d - 1)), r.uniform(-1.0, 1.0, (200, count)), strict=True):
             shape = np.append(1.0, w / np.linalg.norm(w))

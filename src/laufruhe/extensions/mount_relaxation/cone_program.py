@@ -22,7 +22,7 @@ from uuid import uuid4
 import numpy as np
 from scipy.sparse import coo_array, csc_array, vstack
 
-from laufruhe.extensions.mount_relaxation.cone_solver import Cone, ConeSolver, column, matrix_of, triangle
+from laufruhe.extensions.mount_relaxation.cone_solver import Cone, ConeSolver
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.extensions.mount_relaxation.program import (
@@ -34,6 +34,16 @@ from laufruhe.extensions.mount_relaxation.program import (
 )
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.workers import Speculation, speculation
+from laufruhe.prove.mounts.dual_cones import (
+    LENGTH,
+    MATRIX,
+    SIDES,
+    ZERO,
+    column,
+    in_dual_cones,
+    matrix_of,
+    triangle,
+)
 
 # small price of each square in the objective, which makes the remainder of the multipliers convex
 SQUARE_PRICE = 3e-7
@@ -55,8 +65,6 @@ _SETTINGS = {
 # seconds spent on relaxations after which worker processes start; shorter searches need none
 START_SECONDS = 0.25
 
-# kinds of cones
-ZERO, SIDES, LENGTH, MATRIX = "zero", "nonnegative", "second order", "semidefinite"
 _Step: TypeAlias = tuple[str, bytes, Array | int]
 Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
@@ -84,7 +92,7 @@ class ConeProgram:
         self._settings = {**_SETTINGS, **dict(zip(("tol_gap_rel", "tol_feas"), tolerances, strict=True))}
         self.rows: list[Any] = []
         self.right: list[Array] = []
-        self.cones: list[str] = []
+        self.cones: list[tuple[str, int]] = []
         self._of_products: list[bool] = []
         blocks = [_entries(size) for quadratic in program.quadratics for size in quadratic.blocks]
         self.blocks = np.cumsum([len(program.prices), *blocks])
@@ -128,7 +136,7 @@ class ConeProgram:
         shape = len(block), int(self.modes[-1])
         self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
         self.right.append(np.zeros(len(block)) if right is None else np.asarray(right, dtype=float))
-        self.cones.append(cone)
+        self.cones.append((cone, len(block)))
         self._of_products.append(of_product)
 
     def _add_mode(self, number: int, mode: ModeConstraints) -> None:
@@ -273,7 +281,7 @@ class ConeProgram:
 
     def bound(self, cost: Array, z: Array) -> float:
         """Return the lower bound of an objective that multipliers `z` of the rows prove, for any `z` (E44, E56)."""
-        z = self._in_dual_cones(z)
+        z = in_dual_cones(z, self.cones)
         remainder = cost + self._matrix.T @ z
         numbers = remainder[: len(self._uppers)]
         bound = float(np.minimum(numbers * self._lowers, numbers * self._uppers).sum() - np.concatenate(self.right) @ z)
@@ -291,7 +299,9 @@ class ConeProgram:
 
         A score is the violation of products at the optimum, times its multipliers.
         """
-        z = np.where(np.repeat(self._of_products, [*map(len, self.right)]), 0.0, self._in_dual_cones(solution.z))
+        z = np.where(
+            np.repeat(self._of_products, [size for _, size in self.cones]), 0.0, in_dual_cones(solution.z, self.cones)
+        )
         scores = []
         for remainder, moments in zip(self._mode_matrices(self._matrix.T @ z), solution.modes, strict=True):
             violations = moments[1:] - solution.s[:, None, None] * moments[0]
@@ -300,19 +310,6 @@ class ConeProgram:
             squares = np.abs(np.einsum("ab,ab->b", remainder[0], moments[0] - np.outer(corner, corner)))
             scores.append((priced.sum(axis=1), np.asarray((priced.sum(axis=0) + squares)[1:])))
         return scores
-
-    def _in_dual_cones(self, z: Array) -> Array:
-        parts = []
-        for cone, part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
-            if cone == SIDES:
-                part = np.maximum(part, 0.0)
-            elif cone == LENGTH:
-                part = np.append(max(part[0], float(np.linalg.norm(part[1:]))), part[1:])
-            elif cone == MATRIX:
-                values, vectors = np.linalg.eigh(matrix_of(part, math.isqrt(2 * len(part))))
-                part = column((vectors * np.maximum(values, 0.0)) @ vectors.T)
-            parts.append(part)
-        return np.concatenate(parts)
 
     def _mode_matrices(self, x: Array) -> list[Array]:
         # matrices of Z and all Z_j by mode, shape (1 + numbers, 6, 6)
@@ -326,8 +323,7 @@ class ConeProgram:
 
         kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
         cones = []
-        for cone, right in zip(self.cones, self.right, strict=True):
-            size = len(right)
+        for cone, size in self.cones:
             if cone == MATRIX:
                 # rows of the matrix from the size of its triangle
                 cones.append(Cone(size, clarabel.PSDTriangleConeT(math.isqrt(2 * size)), True))

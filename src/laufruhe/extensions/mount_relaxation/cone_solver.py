@@ -12,10 +12,8 @@ cone alike.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -169,24 +167,3 @@ def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, 
         start += size
     column_scales[entries] = 1.0 / row_scales[count:]
     return row_scales[:count], column_scales
-
-
-@cache
-def triangle(size: int) -> tuple[Indices, Indices, Array]:
-    """Return rows and columns of the upper triangle, column by column, and the factors that preserve norms."""
-    columns, rows = np.tril_indices(size)
-    return rows, columns, np.where(rows == columns, 1.0, math.sqrt(2.0))
-
-
-def column(matrices: Array) -> Array:
-    """Return upper triangles column by column, scaled to preserve norms, shape (..., n (n + 1) / 2)."""
-    i, j, factor = triangle(matrices.shape[-1])
-    return np.asarray(matrices[..., i, j] * factor)
-
-
-def matrix_of(entries: Array, size: int) -> Array:
-    """Return the symmetric matrix, shape (size, size), from its entries in the order of `column`."""
-    i, j, factor = triangle(size)
-    matrix = np.zeros((size, size))
-    matrix[i, j] = matrix[j, i] = entries / factor
-    return matrix

@@ -1,38 +1,39 @@
-"""Solve for mount stiffness by convex programs, if objective and limits are convex in it (E16-E19)."""
+"""Solve for mount stiffness by a cone program, if objective and limits are convex in it (E16-E19, E46).
+
+The stiffness matrix A, in coordinates with unit mass, is affine in the stiffnesses. With the weight w of the block, its
+torque-roll axis t, and the mass matrix M, each convex measure f has a cone that is affine in stiffness and f:
+
+    [f, w'; w, A] >= 0          sag w' A^-1 w                                    (E16)
+    f - A >= 0, A - f >= 0      squares of the highest and of the lowest natural angular frequency (E17, E18)
+    |A t / W2 - t| <= f         torque-roll residual                             (E19)
+    |K q - s M q| <= f          the same in raw coordinates, s open              (E46)
+
+Multipliers z in the dual cones of the slacks b - R x bound the objective q' x by (q + R' z)' x - b' z. All x are within
+bounds, except measures f in the objective. Their coefficients are not negative after all z are scaled down.
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import weight_wrench
-from laufruhe.physics.mount_numbers import mass_root
+from laufruhe.physics.mount_numbers import mass_root, total_stiffness
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.decision import STIFFNESS, real_bounds
-from laufruhe.problem.measure import Limit, Measure, Side
+from laufruhe.problem.decision import real_bounds
+from laufruhe.problem.measure import Limit, Measure, Side, Term
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.prove.mounts.convex_functions import (
-    Compliance,
-    ConvexDuals,
-    ConvexFunction,
-    ConvexLimit,
-    ConvexProgram,
-    Eigenvalue,
-    LinearFunction,
-    Residual,
-    StiffnessMatrices,
-    dual_bound,
-)
+from laufruhe.prove.mounts.dual_cones import LENGTH, MATRIX, SIDES, column, in_dual_cones
 from laufruhe.solvers.conclusion import (
     ProofData,
     build_result,
@@ -40,10 +41,16 @@ from laufruhe.solvers.conclusion import (
     infeasible_result,
     smallest_conflict,
 )
+from laufruhe.solvers.cones.cone_program import ConeRows, run_clarabel
+from laufruhe.solvers.cones.conic import ATTEMPTS
 from laufruhe.solvers.prices import Price, bounds_of
 from laufruhe.solvers.result import Result
 
 CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL, channels.TOTAL_STIFFNESS)
+# a bound from the duals of a matrix inequality has these tolerances
+TIGHT: Mapping[str, Any] = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
+# share of the sizes of multipliers and limits from which limits contradict each other
+CONTRADICTION = 1e-6
 
 
 def is_convex(problem: Problem) -> bool:
@@ -65,117 +72,200 @@ def _is_convex_limit(limit: Limit) -> bool:
     return channel in CONVEX and limit.minimum == -math.inf
 
 
-def convex_program(problem: Problem) -> ConvexProgram:
-    """Build the convex program of a problem that `is_convex` accepts."""
-    decisions = problem.decisions
-    lower, upper = real_bounds(decisions)
-    start = np.array([d.real_start for d in decisions])
-    mounting = mounting_in(problem.design(start.tolist()))
-    root = mass_root(mounting.block)
-    slopes, springs = np.zeros((len(decisions), 6, 6)), every_spring(mounting.mounts)
-    for slope, decision in zip(slopes, decisions, strict=True):
-        # derivative of the stiffness matrix (E3)
-        for drive in decision.mount_drives:
-            place, spring = springs[drive.mount]
-            row = np.array(spring.orientation)[drive.number] @ mounting.motions[place]
-            slope += drive.gain * np.outer(row, row)
-    slopes = np.array([root @ slope @ root.T for slope in slopes]).reshape(-1, 6, 6)
-    base = root @ mounting.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
-    matrices = StiffnessMatrices(base, slopes)
-    terms = tuple((term.weight, _function(term.measure, matrices, mounting, problem)) for term in problem.objective)
-    limits = [part for k, limit in enumerate(problem.limits) for part in _limits(limit, k, matrices, mounting, problem)]
-    return ConvexProgram(matrices, lower, upper, terms, tuple(limits))
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows in a cone: constant + slopes' y + top f + free s, shapes (k,), (n, k), (k,) and (k,).
+
+    Attributes
+    ----------
+    size
+        Unit of the measure f [SI].
+    span
+        Bounds of the number s.
+    """
+
+    kind: str
+    constant: Array
+    slopes: Array
+    top: Array
+    size: float
+    free: Array
+    span: tuple[float, float] = (0.0, 0.0)
 
 
-def _function(
-    measure: Measure, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
-) -> ConvexFunction:
-    if measure.channel is channels.SAG:
-        weight = weight_wrench(mounting.block)
-        return Compliance(matrices, mass_root(mounting.block) @ weight, 1.0 / -weight[2])
-    if measure.channel.axis_residual is not None:
-        return Residual(matrices, measure.channel.axis_residual(mounting.block, measure.frequency))
-    gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
-    start = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
-    return LinearFunction(start - float(gradient @ [d.real_start for d in problem.decisions]), gradient)
+class ConvexProgram:
+    """Cone program of stiffnesses between bounds: minimise a weighted sum of measures under limits.
 
+    The variables are the stiffnesses y from -1 to 1, the measure f of each term, and a number s of each block.
+    """
 
-def _limits(
-    limit: Limit, source: int, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
-) -> list[ConvexLimit]:
-    upper: ConvexFunction
-    lower: ConvexFunction | None = None
-    if limit.measure.channel is channels.FREQUENCIES:
-        upper, lower = Eigenvalue(matrices, 1.0), Eigenvalue(matrices, -1.0)
-        maximum, minimum = ((math.tau * edge) ** 2 for edge in (limit.maximum, limit.minimum))
-    else:
-        upper, maximum, minimum = _function(limit.measure, matrices, mounting, problem), limit.maximum, limit.minimum
-        if isinstance(upper, LinearFunction):
-            lower = LinearFunction(-upper.constant, -upper.gradient)
-    limits = [ConvexLimit(upper, maximum, source)] if limit.maximum < math.inf else []
-    if lower is not None and limit.minimum > -math.inf:
-        limits.append(ConvexLimit(lower, -minimum, source, "at least"))
-    return limits
+    def __init__(self, problem: Problem, objective: Sequence[Term], limits: Sequence[Limit]) -> None:
+        self.problem, decisions = problem, problem.decisions
+        lower, upper = real_bounds(decisions)
+        self.centre, self.half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        self._mounting = mounting = mounting_in(problem.design(self.centre.tolist()))
+        self._root, springs = mass_root(mounting.block), every_spring(mounting.mounts)
+        slopes = np.zeros((len(decisions), 6, 6))
+        for slope, decision in zip(slopes, decisions, strict=True):
+            # derivative of the stiffness matrix (E3)
+            for drive in decision.mount_drives:
+                place, spring = springs[drive.mount]
+                row = self._root @ (np.array(spring.orientation)[drive.number] @ mounting.motions[place])
+                slope += drive.gain * np.outer(row, row)
+        matrices = np.array([self._root @ mounting.stiffness @ self._root.T, *(self.half[:, None, None] * slopes)])
+        self._unit = float(np.trace(matrices[0])) / 6.0 or 1.0
+        self._matrices = matrices / self._unit
+        self.terms = [(term.weight, self._block(term.measure)) for term in objective]
+        # blocks of limits, with the change of their rows by the limit
+        self.limits = [(limit, *part) for limit in limits for part in self._limited(limit)]
+        blocks = [block for _, block in self.terms] + [block for _, _, block, _ in self.limits]
+        n, terms = len(decisions), len(self.terms)
+        heads = np.zeros((terms, sum(len(block.constant) for block in blocks)))
+        free, first = np.zeros((len(blocks), heads.shape[1])), 0
+        for k, block in enumerate(blocks):
+            part = slice(first, first + len(block.constant))
+            if k < terms:
+                heads[k, part] = block.top
+            free[k, part], first = block.free, part.stop
+        self._cones = [(block.kind, len(block.constant)) for block in blocks]
+        self._right = np.concatenate([np.zeros(0), *(block.constant for block in blocks)])
+        slopes_of_rows = np.concatenate([np.zeros((n, 0)), *(block.slopes for block in blocks)], axis=1)
+        self._rows = -np.concatenate([slopes_of_rows, heads, free])
+        spans = np.array([block.span for block in blocks]).reshape(-1, 2)
+        self._cost = np.concatenate([np.zeros(n), [w * block.size for w, block in self.terms], np.zeros(len(blocks))])
+        self._low = np.concatenate([-np.ones(n), np.zeros(terms), spans[:, 0]])
+        self._high = np.concatenate([np.ones(n), np.zeros(terms), spans[:, 1]])
+
+    def _block(self, measure: Measure) -> Block:
+        matrices, n = self._matrices, len(self.half)
+        if measure.channel is channels.SAG:
+            weight = weight_wrench(self._mounting.block)
+            pull = self._root @ weight / math.sqrt(-weight[2] * self._unit)
+            solvable = np.linalg.eigvalsh(matrices[0])[0] > 0.0
+            size = float(pull @ np.linalg.solve(matrices[0], pull)) if solvable else 1.0
+            bordered = np.pad(matrices, [(0, 0), (1, 0), (1, 0)])
+            bordered[0, 0, 1:] = bordered[0, 1:, 0] = pull / math.sqrt(size)
+            rows, top = column(bordered), column(np.diag([1.0, *np.zeros(6)]))
+            return Block(MATRIX, rows[0], rows[1:], top, size, np.zeros_like(top))
+        if measure.channel.axis_residual is not None:
+            axis = measure.channel.axis_residual(self._mounting.block, measure.frequency)
+            parts = np.array([axis.stiffness_part(matrix * self._unit) for matrix in matrices])
+            size, mass = float(np.linalg.norm(parts[0])) or 1.0, float(np.linalg.norm(axis.mass))
+            # the best s is at most |L A q| / |m|
+            reach = max(float(np.linalg.norm(parts, axis=1).sum()) / mass, axis.minimum)
+            rows = np.pad(parts / size, [(0, 0), (1, 0)])
+            top, free = np.eye(7)[0], np.append(0.0, -axis.mass / mass)
+            span = axis.minimum * mass / size, min(axis.maximum, reach) * mass / size
+            return Block(LENGTH, rows[0], rows[1:], top, size, free, span)
+        gains = np.array([sum(drive.gain for drive in d.mount_drives) for d in self.problem.decisions])
+        total = total_stiffness(self._mounting.mounts)
+        size = abs(total) or 1.0
+        slopes = -(gains * self.half / size).reshape(n, 1)
+        return Block(SIDES, np.array([-total / size]), slopes, np.ones(1), size, np.zeros(1))
+
+    def _limited(self, limit: Limit) -> list[tuple[str, Block, Array]]:
+        sides: list[tuple[str, float, float]] = [("at most", limit.maximum, 1.0), ("at least", limit.minimum, -1.0)]
+        parts: list[tuple[str, Block, Array]] = []
+        if limit.measure.channel is channels.FREQUENCIES:
+            rows, unit = column(self._matrices), column(np.eye(6)) / self._unit
+            for side, edge, sign in sides:
+                if math.isfinite(edge):
+                    constant = sign * (unit * (math.tau * edge) ** 2 - rows[0])
+                    block = Block(MATRIX, constant, -sign * rows[1:], unit, 1.0, np.zeros_like(unit))
+                    # rows change by the square of 2 pi f
+                    parts.append((side, block, unit * 2.0 * math.tau**2 * edge))
+            return parts
+        plain = self._block(limit.measure)
+        for side, edge, sign in sides:
+            if math.isfinite(edge):
+                constant = sign * (plain.constant + plain.top * edge / plain.size)
+                block = Block(plain.kind, constant, sign * plain.slopes, plain.top, plain.size, plain.free, plain.span)
+                parts.append((side, block, plain.top / plain.size))
+        return parts
+
+    def solve(self) -> tuple[Array, Array] | None:
+        """Return stiffnesses [N/m], shape (n,), and multipliers; None if these prove that the limits contradict."""
+        import clarabel
+
+        kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
+        rows, count, n = ConeRows(len(self._cost)), len(self._right), len(self.half)
+        rows.add(np.arange(count), np.arange(len(self._cost))[:, None], self._rows, self._right)
+        bounded = np.delete(np.arange(len(self._cost)), np.s_[n : n + len(self.terms)])
+        for sign, edges in ((1.0, self._high), (-1.0, -self._low)):
+            rows.add(np.arange(len(bounded)), bounded, sign, edges[bounded])
+        rows.cones += [
+            clarabel.PSDTriangleConeT(math.isqrt(2 * size)) if kind == MATRIX else kinds[kind](size)
+            for kind, size in self._cones
+        ]
+        rows.cones.append(clarabel.NonnegativeConeT(2 * len(bounded)))
+        for settings in (TIGHT, *ATTEMPTS):
+            raw = run_clarabel(rows, self._cost, settings)
+            x, z = (np.nan_to_num(np.array(part)) for part in (raw.x, raw.z))
+            if "Infeasible" in str(raw.status) and self.excludes(z[:count]):
+                return None
+            if "Solved" in str(raw.status):
+                break
+        return self.centre + self.half * np.clip(x[:n], -1.0, 1.0), z[:count]
+
+    def excludes(self, z: Array) -> bool:
+        """Return True if multipliers of the limits prove that no stiffnesses keep all limits."""
+        z = in_dual_cones(z, self._cones)
+        z[: sum(count for _, count in self._cones[: len(self.terms)])] = 0.0
+        proof, _ = self._least(np.zeros_like(self._cost), z)
+        return proof > CONTRADICTION * float(np.abs(self._right) @ np.abs(z))
+
+    def bound(self, z: Array) -> tuple[float, Array]:
+        """Return the lower bound of the objective that multipliers prove, for any multipliers, and its gradient.
+
+        The gradient is that of the linear bound by the stiffnesses, shape (n,).
+        """
+        z = in_dual_cones(z, self._cones)
+        heads = slice(len(self.half), len(self.half) + len(self.terms))
+        prices = -self._rows[heads] @ z
+        z = z * float(np.min(np.where(prices > self._cost[heads], self._cost[heads] / np.maximum(prices, 1e-300), 1.0)))
+        return self._least(self._cost, z)
+
+    def _least(self, cost: Array, z: Array) -> tuple[float, Array]:
+        remainder = cost + self._rows @ z
+        least = np.minimum(remainder * self._low, remainder * self._high).sum() - self._right @ z
+        return float(least), remainder[: len(self.half)] / np.where(self.half > 0.0, self.half, np.inf)
+
+    def prices(self, z: Array) -> dict[Side, Price]:
+        """Return the decrease of the objective per unit of each side of the limits."""
+        parts = np.split(in_dual_cones(z, self._cones), np.cumsum([count for _, count in self._cones])[:-1])
+        priced = zip(self.limits, parts[len(self.terms) :], strict=True)
+        return {(limit, side): Price.both(float(change @ part)) for (limit, side, _, change), part in priced}
 
 
 def solve_convex_mounts(problem: Problem) -> Result:
     """Return the global optimum of a problem that `is_convex` accepts, with its certificate."""
-    from laufruhe.solvers.mounts.cones import solve_cones
-
     started = time.perf_counter()
-    program = convex_program(problem)
+    program = ConvexProgram(problem, problem.objective, problem.limits)
     initial = evaluate_start(problem)
     model_time = time.perf_counter()
-    solution = solve_cones(program)
+    solution = program.solve()
     solved = time.perf_counter()
     timing = {"model": model_time - started, "solve": solved - model_time}
     if solution is None:
 
         def is_infeasible(subset: Sequence[Limit]) -> bool:
-            limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in subset)
-            return solve_cones(replace(program, terms=(), limits=limits)) is None
+            return ConvexProgram(problem, (), subset).solve() is None
 
         return infeasible_result(problem, initial, smallest_conflict(problem.limits, is_infeasible), timing)
-    x, duals = solution
-    bound, gradient = dual_bound(program, x, duals)
+    x, z = solution
+    bound, gradient = program.bound(z)
+    design = evaluate_design(problem, x.tolist())
     proof = ProofData(
         bound=bound,
         strength=ProofStrength.EXACT,
-        kkt_residual=_residual(program, x, duals, gradient),
+        # the gap of a feasible design bounds stationarity and complementarity
+        kkt_residual=max(design.violation, (design.value - bound) / (abs(design.value) or 1.0), 0.0),
         method="linear matrix inequalities, dual bound over the box of stiffnesses",
-        prices=_prices(problem, program, duals),
+        prices=program.prices(z),
         bounds={
             name: price
             for k, (decision, value) in enumerate(zip(problem.decisions, x.tolist(), strict=True))
             for name, price in bounds_of(decision, np.array([value]), gradient[k : k + 1]).items()
         },
     )
-    design = evaluate_design(problem, [float(v) for v in x])
     return build_result(design, initial, proof, {**timing, "evaluate": time.perf_counter() - solved})
-
-
-def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, Price]:
-    # decrease of the objective per unit of a limit
-    prices: dict[Side, Price] = {}
-    for limit, price in zip(program.limits, duals.prices, strict=True):
-        source = problem.limits[limit.source]
-        slope = 1.0
-        if source.measure.channel is channels.FREQUENCIES:
-            # the program limits the square of 2 pi f
-            slope = 2.0 * math.tau * math.sqrt(abs(limit.maximum))
-        prices[source, limit.side] = Price.both(price * slope)
-    return prices
-
-
-def _residual(program: ConvexProgram, x: Array, duals: ConvexDuals, gradient: Array) -> float:
-    # largest relative violation of the KKT conditions
-    width = np.where(program.upper > program.lower, program.upper - program.lower, 1.0)
-    scale = abs(program.objective(x)) or 1.0
-    step_end = np.clip(x - gradient * width**2 / scale, program.lower, program.upper)
-    # possible decrease of the linear model inside the box
-    decrease = float(np.abs(gradient * (step_end - x)).max(initial=0.0)) / scale
-    violations = [decrease]
-    for limit, price in zip(program.limits, duals.prices, strict=True):
-        slack = limit.maximum - limit.function.value(x)
-        violations += [max(-slack, 0.0) / (abs(limit.maximum) or 1.0), abs(price * slack) / scale]
-    return max(violations)
