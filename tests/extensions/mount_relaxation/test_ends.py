@@ -73,7 +73,7 @@ def test_every_relaxation_of_a_box_counts_once(known: tuple[float, np.ndarray] |
         solved.append(ends)
         return 0.5, np.zeros(2)
 
-    search = SimpleNamespace(value=1.0, cutoff=0.9, contracted=lambda *ends: ends, bound=bound)
+    search = SimpleNamespace(value=1.0, cutoff=0.9, bound=bound)
     narrowing = _Narrowing(search, 10, None, known)
     assert narrowing.narrow(np.zeros(2), np.ones(2))[0] == 0.5
     assert narrowing.spent == 1

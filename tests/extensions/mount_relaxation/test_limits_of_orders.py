@@ -68,10 +68,10 @@ def test_no_design_that_keeps_a_limit_is_under_the_bound(name: str) -> None:
     minimum, near = min(value for _, value, _ in kept), max(kept, key=lambda each: each[2])[0]
     boxes = SdpRelaxation(problem, 1.3 * minimum, 1e-3, near.tolist())
     assert boxes.limits.norms or boxes.limits.ratios
-    bound = boxes.relax(boxes.lower, boxes.upper)[0]
+    bound = boxes.bound(boxes.lower, boxes.upper)[0]
     program, _ = boxes.cut_off(boxes.lower, boxes.upper)
     boxes.limits = Limits((), ())
-    without = boxes.relax(boxes.lower, boxes.upper)[0]
+    without = boxes.bound(boxes.lower, boxes.upper)[0]
     assert (1.0 - 1e-3) * without <= bound <= minimum
     # least s of all that is better than the best known
     cones = ConeProgram(program)
@@ -94,9 +94,9 @@ def test_a_limit_that_holds_the_best_design_back_raises_the_bound() -> None:
         if kept:
             minimum, x = min(kept, key=lambda each: each[0])
             boxes = SdpRelaxation(problem, 1.2 * minimum, 1e-3, x.tolist())
-            with_limit = boxes.relax(boxes.lower, boxes.upper)[0]
+            with_limit = boxes.bound(boxes.lower, boxes.upper)[0]
             boxes.limits = Limits((), ())
-            raised.append(with_limit / boxes.relax(boxes.lower, boxes.upper)[0])
+            raised.append(with_limit / boxes.bound(boxes.lower, boxes.upper)[0])
     assert max(raised) > 1.001
 
 

@@ -19,7 +19,7 @@ from prove.test_subdivision import boxes
 def ratio(problem: Problem, low: np.ndarray, high: np.ndarray) -> float:
     """Return the bound of a box over the least design seen in it; a worse design is known."""
     minimum = min(designs(problem, low, high, 1))
-    return SdpRelaxation(problem, 1.2 * minimum, 1e-4, problem.start).relax(low, high)[0] / minimum
+    return SdpRelaxation(problem, 1.2 * minimum, 1e-4, problem.start).bound(low, high)[0] / minimum
 
 
 KINDS = {"damping that follows": FOLLOWING, "hydraulic": HYDRAULIC, "joined": OPEN_PAD}

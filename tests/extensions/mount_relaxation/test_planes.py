@@ -45,36 +45,20 @@ def test_what_is_possible_stays_in_the_box(seed: int) -> None:
         for share in (1.0, 0.5, 0.1):
             middle, half = given[0], 0.5 * share * (whole[:, 1] - whole[:, 0])
             box = np.stack([np.maximum(whole[:, 0], middle - half), np.minimum(whole[:, 1], middle + half)], axis=1)
-            kept = plane.contracted(box)
-            assert kept is not None
             inside = given[np.all((given >= box[:, 0]) & (given <= box[:, 1]), axis=1)]
-            assert np.all(inside >= kept[:, 0] - room)
-            assert np.all(inside <= kept[:, 1] + room)
-            low, high = plane.stiffness_range(kept)
+            low, high = plane.stiffness_range(box)
+            narrower += high < float(plane.high.max())
             for k11, k22, k12 in inside:
                 values = np.linalg.eigvalsh([[k11, k12], [k12, k22]])
                 assert low - room <= values[0]
                 assert values[1] <= high + room
-            narrower += int(np.any(kept[:, 1] - kept[:, 0] < 0.9 * (box[:, 1] - box[:, 0])))
     assert narrower > 5
 
 
-def test_a_box_without_anything_possible_is_empty() -> None:
-    """Beside the wedge of angles, under the least and over the largest stiffness."""
-    plane = PlaneStiffness(np.array([100.0, 1.0]), np.array([200.0, 2.0]), (-0.2, 0.2), np.array([150.0, 1.5]))
-    for box in ([[100, 200], [1, 2], [60, 80]], [[1, 2], [100, 200], [-5, 5]], [[10, 20], [10, 20], [-5, 5]]):
-        assert plane.contracted(np.array(box, dtype=float)) is None
-    kept = plane.contracted(plane.full_box)
-    assert kept is not None
-    # the sine of twice the angle holds what is across
-    assert kept[2, 1] <= 0.5 * 199.0 * math.sin(0.4) * (1.0 + 1e-9)
-
-
 @pytest.mark.parametrize("seed", range(2))
-def test_a_whole_box_is_reached_and_is_the_same_in_every_unit(seed: int) -> None:
-    """Some stiffnesses and angles reach every end; a box in N/m is narrowed as the same box in MN/m."""
-    generator, unit, kept = np.random.default_rng(seed), 1e-6, 0
-    for plane in planes(generator, 20):
+def test_a_whole_box_is_reached(seed: int) -> None:
+    """Some stiffnesses and angles reach every end."""
+    for plane in planes(np.random.default_rng(seed), 20):
         whole = plane.full_box
         ends = np.stack(np.meshgrid(*zip(plane.low, plane.high, strict=True)), axis=-1).reshape(-1, 2)
         angles = np.linspace(*plane.angles, 4001)
@@ -82,13 +66,3 @@ def test_a_whole_box_is_reached_and_is_the_same_in_every_unit(seed: int) -> None
         p, d = (0.5 * (ends[:, :1] + sign * ends[:, 1:]) for sign in (1.0, -1.0))
         reached = [np.array([entry.min(), entry.max()]) for entry in (p + d * c, p - d * c, d * s)]
         assert whole == pytest.approx(np.array(reached), abs=1e-5 * float(plane.high.max()))
-        scaled = PlaneStiffness(unit * plane.low, unit * plane.high, plane.angles, unit * plane.reference)
-        for width in (0.5, 0.1):
-            middle, half = generator.uniform(whole[:, 0], whole[:, 1]), 0.5 * width * (whole[:, 1] - whole[:, 0])
-            box = np.stack([middle - half, middle + half], axis=1)
-            found, other = plane.contracted(box), scaled.contracted(unit * box)
-            assert (found is None) == (other is None)
-            if found is not None:
-                kept += 1
-                assert other == pytest.approx(unit * found, rel=1e-9, abs=1e-9 * unit)
-    assert kept > 3

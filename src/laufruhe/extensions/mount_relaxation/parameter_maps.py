@@ -40,9 +40,6 @@ TEST_ANGLE = 0.3
 AXIS_TOL = 1e-9
 # shares of the largest stiffness: smallest range over which dampers are fitted, largest range that counts as none
 MIN_RANGE, ZERO_RANGE = 1e-3, 1e-6
-# slack for rounding, as a share of the largest stiffness; rounds of contraction
-ROUNDING = 1e-9
-ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,63 +387,16 @@ class PlaneStiffness:
     def stiffness_range(self, box: Array) -> tuple[float, float]:
         """Return the smallest and the largest principal stiffness on a box, shape (3, 2) [N/m]."""
         (low1, low2), (high1, high2) = self.low, self.high
-        along_range, _, slope = self._polar(box)
+        # range of (k1 - k2) / 2 times a positive cosine: (K11 - K22) / 2 and K12 along the middle angle 2b
+        half_width, middle = self.angles[1] - self.angles[0], self.angles[0] + self.angles[1]
+        differences, cosine, sine = 0.5 * (box[0] - box[1][::-1]), math.cos(middle), math.sin(middle)
+        along = np.sort(cosine * differences) + np.sort(sine * box[2])
         # k1 - k2 has one sign on the whole box
-        if slope < math.inf and along_range[0] > 0.0:
+        if half_width < 0.5 * math.pi - 1e-6 and along[0] > 0.0:
             return low2, high1
-        if slope < math.inf and along_range[1] < 0.0:
+        if half_width < 0.5 * math.pi - 1e-6 and along[1] < 0.0:
             return low1, high2
         return min(low1, low2), max(high1, high2)
-
-    def _polar(self, box: Array) -> tuple[tuple[float, float], tuple[float, float], float]:
-        # ranges of (K11 - K22) / 2 and K12 along and across the middle angle 2b, and their largest ratio
-        half_width, middle = self.angles[1] - self.angles[0], self.angles[0] + self.angles[1]
-        differences = 0.5 * (box[0] - box[1][::-1])
-        cosine, sine = math.cos(middle), math.sin(middle)
-        along_range = np.sort(np.outer([cosine, 0.0], differences)[0]) + np.sort(sine * box[2])
-        across_range = np.sort(-sine * differences) + np.sort(cosine * box[2])
-        slope = math.tan(half_width) if half_width < 0.5 * math.pi - 1e-6 else math.inf
-        return (float(along_range[0]), float(along_range[1])), (float(across_range[0]), float(across_range[1])), slope
-
-    def contracted(self, box: Array) -> Array | None:
-        """Return a smaller box of entries K11, K22, K12 with all possible matrices of a box, (3, 2).
-
-        The result is None without any.
-        """
-        part, rounding = box.copy(), ROUNDING * float(self.high.max())
-        for _ in range(ROUNDS):
-            along_range, across_range, slope = self._polar(part)
-            minimum = max(across_range[0], -across_range[1], 0.0)
-            if minimum - rounding > slope * max(-along_range[0], along_range[1]):
-                return None
-            low, high = self.stiffness_range(part)
-            # the trace lies between the sums of the ranges
-            smallest, largest = float(self.low.sum()) - rounding, float(self.high.sum()) + rounding
-            lower = np.maximum(part[:2, 0], smallest - part[1::-1, 1])
-            part[:2, 1] = np.minimum(part[:2, 1], largest - part[1::-1, 0])
-            part[:2, 0] = lower
-            part = _contract_by_eigenvalues(part, low - rounding, high + rounding)
-            if np.any(part[:, 0] > part[:, 1] + rounding):
-                return None
-            part = np.sort(part, axis=1)
-        return part
-
-
-def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:
-    """Return a smaller box of matrix entries, (3, 2), with all matrices K whose eigenvalues are in [low, high]."""
-    part = box.copy()
-    off_diagonal = max(box[2, 0], -box[2, 1], 0.0)
-    above_low, below_high = box[:2, 1] - low, high - box[:2, 0]
-    if min(above_low.min(), below_high.min()) < 0.0:
-        part[0] = 1.0, -1.0
-        return np.asarray(part * high)
-    for k, partner in ((0, 1), (1, 0)):
-        minimum = low + (off_diagonal**2 / above_low[partner] if above_low[partner] > 0.0 else 0.0)
-        maximum = high - (off_diagonal**2 / below_high[partner] if below_high[partner] > 0.0 else 0.0)
-        part[k] = max(box[k, 0], minimum), min(box[k, 1], maximum)
-    reach = math.sqrt(min(above_low[0] * above_low[1], below_high[0] * below_high[1]))
-    part[2] = max(box[2, 0], -reach), min(box[2, 1], reach)
-    return part
 
 
 def _sine_range(low: float, high: float) -> tuple[float, float]:

@@ -20,7 +20,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import (
     GAP_SAFETY,
-    INFEASIBLE_PART,
     BoundedParts,
     Box,
     BoxBisection,
@@ -224,10 +223,6 @@ class _Narrowing(BoxBisection):
         """
         previous = best = -math.inf
         while True:
-            part = self._search.contracted(lower, upper)
-            if part is None:
-                return INFEASIBLE_PART
-            lower, upper = part
             (bound, scores), self._root_bound = self._root_bound or self._search.bound(lower, upper), None
             self.spent += 1
             previous, best = best, max(best, bound)

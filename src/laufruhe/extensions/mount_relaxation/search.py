@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -38,7 +36,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import GAP_SAFETY
 from laufruhe.prove.mounts.ranges import number_ranges
-from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_problem
 
 # total work of the relaxations, each its number of moments to the power EFFORT, and the most relaxations
 WORK, EFFORT, MAX_BOXES = 6e7, 5, 100
@@ -99,7 +96,6 @@ class SdpRelaxation:
         ones = np.ones(5 * len(self.modes))
         self.lower, self.upper = np.append(lower, -ones), np.append(upper, ones)
         self.mode_sides = [slice(len(lower) + 5 * k, len(lower) + 5 * (k + 1)) for k in range(len(self.modes))]
-        self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * gap_tolerance) if is_stiffness_problem(problem) else None
         self._model = AffineModel(off_resonance(problem))
         unbalances = [v for v, d in zip(reference, problem.decisions, strict=True) if d.is_affine]
         basis = unbalance_basis(self._model.domains, unbalances)
@@ -133,23 +129,12 @@ class SdpRelaxation:
         If the mounts are symmetric, models for symmetric and for antisymmetric motions follow.
         """
         count = self.mount_numbers
-        boxes = {key: np.column_stack([lower[sides], upper[sides]]) for key, sides in self._plane_sides()}
+        boxes = {
+            key: np.column_stack([lower, upper])[count + 3 * k : count + 3 * (k + 1)]
+            for key, (k, _) in self._planes.items()
+        }
         mounts = open_mounts(self.problem, lower[:count], upper[:count], self._frames, boxes)
         return (mounts, *split_mounts(mounts))
-
-    def _plane_sides(self) -> list[tuple[Any, slice]]:
-        first = self.mount_numbers
-        return [(key, slice(first + 3 * k, first + 3 * (k + 1))) for key, (k, _) in self._planes.items()]
-
-    def contracted(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-        """Return the box without impossible stiffness matrices of turning springs; None if none is possible."""
-        lower, upper = lower.copy(), upper.copy()
-        for key, sides in self._plane_sides():
-            part = self._planes[key][1].contracted(np.column_stack([lower[sides], upper[sides]]))
-            if part is None:
-                return None
-            lower[sides], upper[sides] = part.T
-        return lower, upper
 
     def reference_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
         """Return the numbers s, shape (numbers,), of that design in a box which is nearest to the best design.
@@ -179,8 +164,7 @@ class SdpRelaxation:
     @property
     def is_sampled_fully(self) -> bool:
         """True if bounds by orders are also bounds of the sampled norms."""
-        plain = self._stiffness_boxes is None or self._stiffness_boxes.is_sampled_fully
-        return plain and all(query.is_sampled_fully for _, query in self._terms)
+        return all(query.is_sampled_fully for _, query in self._terms)
 
     @property
     def max_boxes(self) -> int:
@@ -191,20 +175,6 @@ class SdpRelaxation:
 
     def bound(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """Return a lower bound of the objective on a box [SI], and branching scores of its sides, shape (n,)."""
-        stiffness_bound, contracted_box = 0.0, self.contracted(lower, upper)
-        if contracted_box is None:
-            return math.inf, np.zeros(len(lower))
-        lower, upper = contracted_box
-        if self._stiffness_boxes is not None:
-            count = self.mount_numbers
-            stiffness_bound = float(self._stiffness_boxes.bounds(lower[None, :count], upper[None, :count])[0][0])
-        if stiffness_bound >= self.cutoff:
-            return stiffness_bound, np.zeros(len(lower))
-        bound, scores = self.relax(lower, upper)
-        return max(stiffness_bound, bound), scores
-
-    def relax(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Return a lower bound of the objective on a box by the relaxation [SI], and branching scores, shape (n,)."""
         total, scores = self._constant, np.zeros(len(lower))
         for k, (weight, _) in enumerate(self._terms):
             box = self._box(k, lower, upper)
