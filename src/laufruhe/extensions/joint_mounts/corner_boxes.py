@@ -49,9 +49,8 @@ MIN_CORNER_SHARE = 2
 """Smallest budget of vertices, as a multiple of those of a box."""
 NO_PRICE = 1e-8
 """Price of a limit, in objectives, that counts as zero."""
-ROUNDS, STEPS = 2, 40
-"""Passes over the limits to find their prices, and steps of each golden section search."""
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+ROUNDS = 2
+"""Passes over the limits to find their prices."""
 
 ExactObjective: TypeAlias = Callable[[Array, Array], float]
 """Exact objective [SI] of mounts and columns of unbalances; infinite if a limit is violated."""
@@ -61,8 +60,7 @@ ExactObjective: TypeAlias = Callable[[Array, Array], float]
 class Corner:
     """Optimal unbalances for the mounts at a vertex, shape (columns,), and their lower bound for any mounts.
 
-    If the limits contradict each other, the unbalances have the smallest violation. The bound `pairing` is None on an
-    undamped resonance.
+    The bound `pairing` is None on an undamped resonance.
     """
 
     columns: Array
@@ -361,7 +359,8 @@ def priced(values: Array, violations: list[Array]) -> Array:
 
 
 def _price(values: Array, violation: Array) -> float:
-    """Return the price with the largest minimum of values + price * violation, by golden section (P4)."""
+    """Return the price with the largest minimum of values + price * violation (P4)."""
+    from scipy.optimize import minimize_scalar
 
     def minimum(price: float) -> float:
         return float((values + price * violation).min())
@@ -370,12 +369,5 @@ def _price(values: Array, violation: Array) -> float:
     if violation[worst] <= 0.0:
         return 0.0
     high = float(values.max() - values[worst]) / float(violation[worst])
-    low, best = 0.0, 0.0
-    for _ in range(STEPS):
-        lower_trial, upper_trial = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        if minimum(lower_trial) >= minimum(upper_trial):
-            high = upper_trial
-        else:
-            low = lower_trial
-        best = max(best, lower_trial, upper_trial, key=minimum)
-    return best
+    optimum = minimize_scalar(lambda price: -minimum(price), bounds=(0.0, high), method="bounded")
+    return max(0.0, float(optimum.x), key=minimum)

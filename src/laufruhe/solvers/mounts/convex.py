@@ -211,7 +211,7 @@ class ConvexProgram:
         """Return True if multipliers of the limits prove that no stiffnesses keep all limits."""
         z = in_dual_cones(z, self._cones)
         z[: sum(count for _, count in self._cones[: len(self.terms)])] = 0.0
-        proof, _ = self._least(np.zeros_like(self._cost), z)
+        proof, _ = self._minimum(np.zeros_like(self._cost), z)
         return proof > CONTRADICTION * float(np.abs(self._right) @ np.abs(z))
 
     def bound(self, z: Array) -> tuple[float, Array]:
@@ -223,12 +223,12 @@ class ConvexProgram:
         heads = slice(len(self.half), len(self.half) + len(self.terms))
         prices = -self._rows[heads] @ z
         z = z * float(np.min(np.where(prices > self._cost[heads], self._cost[heads] / np.maximum(prices, 1e-300), 1.0)))
-        return self._least(self._cost, z)
+        return self._minimum(self._cost, z)
 
-    def _least(self, cost: Array, z: Array) -> tuple[float, Array]:
+    def _minimum(self, cost: Array, z: Array) -> tuple[float, Array]:
         remainder = cost + self._rows @ z
-        least = np.minimum(remainder * self._low, remainder * self._high).sum() - self._right @ z
-        return float(least), remainder[: len(self.half)] / np.where(self.half > 0.0, self.half, np.inf)
+        minimum = np.minimum(remainder * self._low, remainder * self._high).sum() - self._right @ z
+        return float(minimum), remainder[: len(self.half)] / np.where(self.half > 0.0, self.half, np.inf)
 
     def prices(self, z: Array) -> dict[Side, Price]:
         """Return the decrease of the objective per unit of each side of the limits."""
