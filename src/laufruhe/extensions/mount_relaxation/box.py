@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Objectives, Solution
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Solution
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint, moment_constraints
-from laufruhe.extensions.mount_relaxation.limits import UNBOUNDED
 from laufruhe.extensions.mount_relaxation.modes import mode_constraints
 from laufruhe.extensions.mount_relaxation.odd_multiples import (
     HighOrder,
@@ -22,21 +21,19 @@ from laufruhe.extensions.mount_relaxation.odd_multiples import (
 )
 from laufruhe.extensions.mount_relaxation.orders import EpigraphVariable, MeasureOrders, Order
 from laufruhe.extensions.mount_relaxation.program import (
-    LinearLimit,
     QuadraticBound,
     RootTerm,
     SdpProgram,
 )
 from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, squared
 from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.numerics.budget import timed_rounds
 
 if TYPE_CHECKING:
     from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 
-# rounds in which bounds of the roots of a mean narrow each other; smallest share of the mean of a root to narrow
-ROUNDS, SMALL = 2, 0.03
-# smallest share of a mean lost to loose bounds of odd multiples that makes narrowing worthwhile
+# smallest share of the mean of a root to bound by itself
+SMALL = 0.03
+# smallest share of a mean that counts as lost to loose bounds of odd multiples
 LARGE = 0.03
 # share of the missing bound, lost to loose bounds of odd multiples, that makes a branch worthwhile
 WORTH = 0.25
@@ -103,9 +100,6 @@ class BoxRelaxation:
         result = self._bound_mean(variables, self.roots)
         is_root = np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper)
         if result[0] < self.cutoff and is_root:
-            if self.hides_mean(variables):
-                self.roots = self._narrow_roots(variables, self.roots)
-                result = max(result, self._bound_mean(variables, self.roots), key=lambda candidate: candidate[0])
             root_bounds[:] = self.roots
         return result
 
@@ -127,36 +121,6 @@ class BoxRelaxation:
                         self._score(multiple_scores, [j], float(looseness))
         return bound, joint_scores(scores, multiple_scores, self.upper_norm - bound)
 
-    def _narrow_roots(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> Array:
-        """Return lower bounds of the root of each variable, given that the mean is at most `upper_norm` (E58).
-
-        Upper bounds of odd multiples are narrowed too. All programs of a round have the same constraints, so that they
-        may be solved concurrently.
-        """
-        lower, units = root_bounds.copy(), np.array([variable.unit for variable in variables])
-        no_mode_slopes = np.zeros(5 * len(self.modes))
-        for _ in timed_rounds(ROUNDS):
-            mean = self._mean(variables, lower)
-            if mean.floor >= self.upper_norm:
-                break
-            chosen = np.flatnonzero(_matters(mean.prices)).tolist()
-            multiples = [
-                (id(order), bound)
-                for k in chosen
-                for (order, _), bound in zip(variables[k].multiples, self._bounds_of(variables[k]), strict=True)
-                if np.any(bound.slopes)
-            ]
-            objectives = Objectives(self.cut_off(variables, lower), self.search.ahead)
-            bounds = objectives.all_bounds(
-                [*chosen, *(np.append(-bound.slopes, no_mode_slopes) for _, bound in multiples)]
-            )
-            lower[chosen] = np.maximum(lower[chosen], units[chosen] * bounds[: len(chosen)])
-            for (order, multiple), bound in zip(multiples, bounds[len(chosen) :], strict=True):
-                uppers = self.search.multiple_uppers
-                uppers[order] = min(uppers.get(order, math.inf), multiple.constant - bound)
-            self._multiple_bounds.clear()
-        return lower
-
     def _mean(self, variables: Sequence[EpigraphVariable], roots: Array) -> MeanBound:
         key = tuple(map(id, variables))
         if key not in self._multiple_bounds:
@@ -177,8 +141,7 @@ class BoxRelaxation:
         """Return upper bounds of the odd multiples of a variable, averaged over mounts (E62)."""
         bounds = []
         for order, _ in variable.multiples:
-            amplitude, high_order = self.search.multiple_uppers.get(id(order), math.inf), self._high_order(order)
-            upper = min(self.query.largest_sum(order, self.parts), len(self.query.mounts) * amplitude)
+            high_order, upper = self._high_order(order), self.query.largest_sum(order, self.parts)
             bound = None if high_order is None else high_order.bound
             if bound is None:
                 bound = constant_bound(upper, self._reference)
@@ -220,58 +183,31 @@ class BoxRelaxation:
     def _program(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
     ) -> tuple[SdpProgram, list[Response]]:
-        """Return the semidefinite program of variables at prices, and the responses of all its orders.
-
-        Orders of the variables come first, then orders of limits alone. Limits bound further epigraph variables above,
-        or the squares of forces by the squares of forces at rest (E61).
-        """
+        """Return the semidefinite program of variables at prices, and the responses of all its orders."""
         quadratics: list[QuadraticBound] = []
         responses: list[Response] = []
         constraints: list[MomentConstraint] = []
         roots: list[RootTerm] = []
-        numbers_of_orders: dict[tuple[int, int, int, bool], int] = {}
-
-        def number_of(order: Order, bound: ResponseBound) -> int:
-            key = order.point, order.index, order.part, order.omega > 0.0
-            if key not in numbers_of_orders:
-                response, order_constraints = self._state(order, bound)
-                number = numbers_of_orders[key] = len(responses)
-                constraints.extend(replace(constraint, order=number) for constraint in order_constraints)
-                responses.append(response)
-            return numbers_of_orders[key]
-
         for number, variable in enumerate(variables):
-            numbers = [number_of(o, self.query.bound(o, variable, self.upper_norm)) for o in variable.orders]
-            variable_responses = [responses[k] for k in numbers]
+            stated = [self._state(o, self.query.bound(o, variable, self.upper_norm)) for o in variable.orders]
+            numbers = range(len(responses), len(responses) + len(stated))
+            for k, (_, order_constraints) in zip(numbers, stated, strict=True):
+                constraints.extend(replace(constraint, order=k) for constraint in order_constraints)
+            variable_responses = [response for response, _ in stated]
+            responses += variable_responses
             quadratics += variable.quadratic_bounds(number, self.query, variable_responses, numbers)
             if mean is not None:
                 lengths = variable.lengths(self.query, variable_responses, numbers)
                 lower, upper = float(mean.lower[number]), float(mean.upper[number])
                 roots.append(RootTerm(prices[number], lower, upper, lengths))
         if mean is None:
-            uppers = [(v.root_bound(self.upper_norm / v.share) / v.unit) ** 2 for v in variables]
+            uppers = np.array([(v.root_bound(self.upper_norm / v.share) / v.unit) ** 2 for v in variables])
         else:
-            uppers = (mean.upper**2).tolist()
-        ratios: list[LinearLimit] = []
-        for limit in self.search.limits.norms:
-            for variable in limit.variables:
-                numbers = [number_of(o, limit.query.bound(o, variable, limit.upper)) for o in variable.orders]
-                variable_responses = [responses[k] for k in numbers]
-                quadratics += variable.quadratic_bounds(len(uppers), limit.query, variable_responses, numbers)
-                uppers.append((variable.root_bound(limit.upper / variable.share) / variable.unit) ** 2)
-        for ratio in self.search.limits.ratios:
-            moving, resting = (
-                [number_of(order, UNBOUNDED) for order in orders] for orders in (ratio.orders, ratio.orders_at_rest)
-            )
-            forces = {k: responses[k].forces * responses[k].unit for k in (*moving, *resting)}
-            size = max(float(np.linalg.norm(force[..., 0])) for force in forces.values()) or 1.0
-            matrices = [(k, squared(forces[k] / size)) for k in moving]
-            ratios.append((*matrices, *((k, -(ratio.upper**2) * squared(forces[k] / size)) for k in resting)))
+            uppers = mean.upper**2
         program = SdpProgram(
-            tuple(response.size for response in responses), tuple(response.reaches for response in responses),
-            self.mounts.numbers, responses[0].columns,
-            np.append(0.0 * prices if roots else prices, np.zeros(len(uppers) - len(variables))), np.array(uppers),
-            quadratics, constraints, ratios, self.search.basis.sets, roots, self.modes,
+            tuple(response.size for response in responses), tuple(response.reach for response in responses),
+            self.mounts.numbers, responses[0].columns, 0.0 * prices if roots else prices, uppers,
+            quadratics, constraints, self.search.basis.sets, roots, self.modes,
             np.zeros(self.mounts.numbers) if mean is None else mean.slopes / mean.prices.sum(),
         )  # fmt: skip
         return program, responses

@@ -15,7 +15,6 @@ from collections.abc import Hashable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from typing import Any, TypeAlias
 from uuid import uuid4
 
@@ -30,7 +29,6 @@ from laufruhe.extensions.mount_relaxation.program import (
     RootTerm,
     SdpProgram,
     least_in_ball,
-    least_quadratic,
 )
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.workers import Speculation, speculation
@@ -65,7 +63,7 @@ _SETTINGS = {
 # seconds spent on relaxations after which worker processes start; shorter searches need none
 START_SECONDS = 0.25
 
-_Step: TypeAlias = tuple[str, bytes, Array | int]
+_Step: TypeAlias = tuple[str, bytes, Array]
 Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
 
@@ -176,15 +174,12 @@ class ConeProgram:
         return np.arange(self.ends[order], self.ends[order + 1])
 
     def _add_linear(self) -> None:
-        """Add the linear constraints: ranges of numbers s, sets of unbalances, limits, bounds, block traces."""
+        """Add the linear constraints: ranges of numbers s, sets of unbalances, bounds, block traces."""
         program, numbers = self.program, self.program.numbers
         for sign in (1.0, -1.0):
             self._add(sign * np.eye(numbers), self.first + np.arange(numbers), SIDES, np.ones(numbers))
         for matrix in program.sets:
             self._add(column(matrix)[None], self._corner(0), SIDES)
-        for linear in program.linear:
-            columns = np.concatenate([self._moment(order) for order, _ in linear])
-            self._add(np.concatenate([column(matrix) for _, matrix in linear])[None], columns, SIDES)
         self._add(np.eye(len(program.uppers)), np.arange(len(program.uppers)), SIDES, program.uppers)
         block_number = 0
         for quadratic in program.quadratics:
@@ -244,27 +239,23 @@ class ConeProgram:
         block = np.concatenate([-column(constraint.slopes).T.reshape(len(i), -1), moments], axis=1)
         self._add(block, columns, MATRIX, column(constraint.constant))
 
-    def cost(self, objective: Array | int | None = None) -> Array:
+    def cost(self, objective: Array | None = None) -> Array:
         """Return the coefficients of an objective: that of the program, or as in `minimum`."""
         program, cost = self.program, np.zeros(int(self.modes[-1]))
         if objective is None:
             cost[: len(program.prices)] = program.prices
             cost[self.roots[:-1]] = [root.price for root in program.roots]
             objective = np.append(program.slopes, np.zeros(5 * len(program.modes)))
-        if isinstance(objective, int):
-            cost[self.roots[objective]] = 1.0
-            return cost
         cost[self.first : self.first + program.numbers] = objective[: program.numbers]
         for start, slope in zip(self.modes, objective[program.numbers :].reshape(-1, 5), strict=False):
             # entries (0, k) of a triangle, which are scaled by the root of two
             cost[start + np.cumsum(np.arange(1, 6))] = slope * math.sqrt(0.5)
         return cost
 
-    def minimum(self, objective: Array | int) -> tuple[float, Array]:
+    def minimum(self, objective: Array) -> tuple[float, Array]:
         """Return the proven minimum of an objective, and the numbers s and mode coordinates w at the optimum.
 
-        An integer `objective` is the number of the root to minimise. An array has the slopes by s, then by w of each
-        mode, shape (numbers + 5 modes,).
+        `objective` has the slopes by s, then by w of each mode, shape (numbers + 5 modes,).
         """
         solution = self.solve(self.cost(objective))
         return solution.bound, np.concatenate([solution.s, *(moments[0, 0, 1:] for moments in solution.modes)])
@@ -285,8 +276,8 @@ class ConeProgram:
         remainder = cost + self._matrix.T @ z
         numbers = remainder[: len(self._uppers)]
         bound = float(np.minimum(numbers * self._lowers, numbers * self._uppers).sum() - np.concatenate(self.right) @ z)
-        for order, (size, reaches) in enumerate(zip(self.program.sizes, self.program.reaches, strict=True)):
-            bound += least_quadratic(matrix_of(remainder[self._moment(order)], size), reaches)
+        for order, (size, reach) in enumerate(zip(self.program.sizes, self.program.reaches, strict=True)):
+            bound += least_in_ball(matrix_of(remainder[self._moment(order)], size), reach)
         for matrices in self._mode_matrices(remainder):
             # each s_j with its worse sign
             values, vectors = np.linalg.eigh(matrices[1:])
@@ -363,20 +354,12 @@ class Objectives:
         if ahead is not None:
             ahead.discard()
 
-    def bound(self, key: Hashable, objective: Array | int) -> tuple[float, Array]:
+    def bound(self, key: Hashable, objective: Array) -> tuple[float, Array]:
         """Return the bound and optimum as `ConeProgram.minimum` does; `key` names the objective."""
         step = (self._name, self._program, objective)
         return _bound(step) if self._ahead is None else self._ahead.result((self._name, key), step)
 
-    def all_bounds(self, objectives: Sequence[Array | int]) -> list[float]:
-        """Return the proven minimum of each objective; workers compute later ones ahead."""
-        bounds = []
-        for k, objective in enumerate(objectives):
-            self.prefetch(islice(enumerate(objectives), k, None))
-            bounds.append(self.bound(k, objective)[0])
-        return bounds
-
-    def prefetch(self, objectives: Iterable[tuple[Hashable, Array | int]]) -> None:
+    def prefetch(self, objectives: Iterable[tuple[Hashable, Array]]) -> None:
         """Start to bound objectives that are likely to be needed next, the most likely first."""
         if self._ahead is not None:
             self._ahead.prefetch(

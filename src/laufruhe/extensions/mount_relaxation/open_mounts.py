@@ -152,8 +152,8 @@ class OpenMounts:
         )
 
     def stiffness_factors(self, omega: float) -> NDArray[np.complex128]:
-        """Return 1 + i (eta + W lag) of each spring, shape (springs,); 1 at rest."""
-        return np.asarray(1.0 + 1j * (self.losses * (omega > 0.0) + omega * self.lags), dtype=np.complex128)
+        """Return 1 + i (eta + W lag) of each spring, shape (springs,)."""
+        return np.asarray(1.0 + 1j * (self.losses + omega * self.lags), dtype=np.complex128)
 
     def loss_at(self, omega: float) -> Array:
         """Return a lower bound of the loss matrix at angular frequency `omega`, shape (k, k)."""

@@ -56,8 +56,6 @@ class SpringTerm:
         Pairs of a number j and its matrix, shape (b, b) [N/m or N s/m].
     sides
         Pairs of a matrix C and a sign: C + sign * sum is positive semidefinite.
-    spans
-        Pairs of matrices C and D: (C + sum)(D - sum) is positive semidefinite.
     size
         Size of the sum [N/m or N s/m].
     elastic, viscous
@@ -68,7 +66,6 @@ class SpringTerm:
     axes: Array
     terms: tuple[tuple[int, Array], ...]
     sides: tuple[tuple[Array, float], ...]
-    spans: tuple[tuple[Array, Array], ...]
     size: float
     elastic: float = 1.0
     viscous: float = 0.0
@@ -246,7 +243,7 @@ class ParameterMaps:
                 )
                 bound = np.array([[reach[i]]])
                 sides = (bound, 1.0), (bound, -1.0)
-                springs.append(SpringTerm(m, axes[i][:, None], terms, sides, ((bound, bound),), float(reach[i])))
+                springs.append(SpringTerm(m, axes[i][:, None], terms, sides, float(reach[i])))
         return total, springs
 
     def _in_plane(self, m: int, axes: Array, pair: list[int], kind: slice) -> tuple[Array, list[SpringTerm]]:
@@ -262,18 +259,15 @@ class ParameterMaps:
             for k, matrix in enumerate((first_entry, second_entry, off_diagonal))
         )
         centre = centre1 * first_entry + centre2 * second_entry + centre3 * off_diagonal
-        low, high = plane.stiffness_range(box)
+        low, high = float(plane.low.min()), float(plane.high.max())
         # on a box [[0, K12], [K12, 0]] with |K12| <= h3 lies below diag(h3 w, h3 / w) for any w
         ratio = math.sqrt((halves[0] + ZERO_RANGE * high) / (halves[1] + ZERO_RANGE * high))
         box_bound = np.diag([halves[0] + ratio * halves[2], halves[1] + halves[2] / ratio])
         size = float(halves.max()) or 1.0
-        radius = float(np.linalg.norm(np.array([[halves[0], halves[2]], [halves[2], halves[1]]]), 2))
         sides = [(centre - low * np.eye(2), 1.0), (high * np.eye(2) - centre, -1.0)]
-        spans = [(sides[0][0], sides[1][0])]
         if self._boxes is not None:
             sides += [(box_bound, 1.0), (box_bound, -1.0)]
-            spans += [(radius * np.eye(2), radius * np.eye(2))]
-        spring = SpringTerm(m, axes[pair].T, terms, tuple(sides), tuple(spans), size)
+        spring = SpringTerm(m, axes[pair].T, terms, tuple(sides), size)
         upper = min(high * np.eye(2), centre + box_bound, key=lambda matrix: float(np.trace(matrix)))
         third_axis = np.delete(axes, pair, axis=0)
         third_axis_terms = [
@@ -318,7 +312,7 @@ class ParameterMaps:
             terms.append((self._number(("space", kind.start, m, a, b), decisions), matrix))
         side = half * np.eye(3)
         middle = 0.5 * (low + high) * np.eye(3)
-        return middle, [SpringTerm(m, np.eye(3), tuple(terms), ((side, 1.0), (side, -1.0)), ((side, side),), half)]
+        return middle, [SpringTerm(m, np.eye(3), tuple(terms), ((side, 1.0), (side, -1.0)), half)]
 
     def bounds(self, m: int, kind: slice) -> tuple[Array, Array]:
         """Return lower and upper bounds of stiffness or damping, shape (3, 3) each; call `springs` first."""
@@ -383,20 +377,6 @@ class PlaneStiffness:
         off_diagonal = [d * s for d in (0.5 * (low1 - high2), 0.5 * (high1 - low2)) for s in _sine_range(*doubled)]
         ends = [(min(a for a, _ in values), max(b for _, b in values)) for values in (first, second)]
         return np.array([*ends, (min(off_diagonal), max(off_diagonal))])
-
-    def stiffness_range(self, box: Array) -> tuple[float, float]:
-        """Return the smallest and the largest principal stiffness on a box, shape (3, 2) [N/m]."""
-        (low1, low2), (high1, high2) = self.low, self.high
-        # range of (k1 - k2) / 2 times a positive cosine: (K11 - K22) / 2 and K12 along the middle angle 2b
-        half_width, middle = self.angles[1] - self.angles[0], self.angles[0] + self.angles[1]
-        differences, cosine, sine = 0.5 * (box[0] - box[1][::-1]), math.cos(middle), math.sin(middle)
-        along = np.sort(cosine * differences) + np.sort(sine * box[2])
-        # k1 - k2 has one sign on the whole box
-        if half_width < 0.5 * math.pi - 1e-6 and along[0] > 0.0:
-            return low2, high1
-        if half_width < 0.5 * math.pi - 1e-6 and along[1] < 0.0:
-            return low1, high2
-        return min(low1, low2), max(high1, high2)
 
 
 def _sine_range(low: float, high: float) -> tuple[float, float]:

@@ -16,7 +16,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
 
 import numpy as np
 
@@ -88,10 +87,6 @@ class RootTerm:
         return self.lower * self.upper * self.slope
 
 
-LinearLimit: TypeAlias = tuple[tuple[int, Array], ...]
-"""Sum of <C, M> that is not above zero: order number and C, shape (d, d), of each term."""
-
-
 @dataclass(frozen=True, eq=False)
 class SdpProgram:
     """Objective and constraints of a relaxation.
@@ -101,13 +96,13 @@ class SdpProgram:
     sizes
         Length d of (1, v) for each order.
     reaches
-        For each order, upper bounds of the squares of the entries of v, shape (d - 1,).
+        For each order, an upper bound of |v|^2.
     numbers, columns
         Counts of shared numbers s and of unbalance columns.
     prices, uppers
         Coefficients of the epigraph variables in the objective, and their finite upper bounds.
-    quadratics, constraints, linear
-        Bounds of the epigraph variables, constraints on moments, and limits of transmissibility.
+    quadratics, constraints
+        Bounds of the epigraph variables, and constraints on moments.
     sets
         Matrices C with <C, (1, u)(1, u)'> <= 0 for allowed unbalances, shape (1 + columns, 1 + columns).
     roots
@@ -121,31 +116,18 @@ class SdpProgram:
     """
 
     sizes: tuple[int, ...]
-    reaches: tuple[Array, ...]
+    reaches: tuple[float, ...]
     numbers: int
     columns: int
     prices: Array
     uppers: Array
     quadratics: Sequence[QuadraticBound]
     constraints: Sequence[MomentConstraint]
-    linear: Sequence[LinearLimit]
     sets: Sequence[Array]
     roots: Sequence[RootTerm]
     modes: Sequence[ModeConstraints]
     slopes: Array
     limit: float = math.inf
-
-
-def least_quadratic(matrix: Array, reaches: Array) -> float:
-    """Return a lower bound of the quadratic (1, v)' matrix (1, v) over v with squares of its entries up to `reaches`.
-
-    The shape of `matrix` is (d, d), and that of `reaches` (d - 1,).
-    """
-    plain = least_in_ball(matrix, float(reaches.sum()))
-    if not np.all(np.isfinite(reaches)):
-        return plain
-    sizes = np.concatenate([[1.0], np.sqrt(np.maximum(reaches, _FLAT * reaches.max(initial=0.0)))])
-    return max(plain, least_in_ball(matrix * np.outer(sizes, sizes), float(len(reaches))))
 
 
 def least_in_ball(matrix: Array, reach: float) -> float:

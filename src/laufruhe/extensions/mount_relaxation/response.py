@@ -48,8 +48,8 @@ class Response:
         For each open spring, deflection u and force t, shape (b, d) each.
     places
         For each open place, turns and moments, and s times these, shape (products, d) each.
-    reaches
-        Upper bounds of the squares of v over all designs of the box, shape (d - 1,).
+    reach
+        Upper bound of |v|^2 over all designs of the box.
     unit
         Length of the motion that counts as one.
     """
@@ -62,7 +62,7 @@ class Response:
     forces: ComplexArray
     springs: tuple[tuple[ComplexArray, ComplexArray], ...]
     places: tuple[tuple[ComplexArray, ComplexArray], ...]
-    reaches: Array
+    reach: float
     unit: float
 
     @property
@@ -172,7 +172,7 @@ def response_of(
             for spring, product in zip(mounts.springs, springs, strict=True)
         ),
         tuple(zip(place_loads, places, strict=True)),
-        np.concatenate([np.ones(columns), *([(bounds / (unit * sizes)) ** 2] * 2)]),
+        columns + 2.0 * float(np.sum((bounds / (unit * sizes)) ** 2)),
         unit,
     )
 
@@ -272,9 +272,7 @@ def _motion_bound(mounts: OpenMounts, loads: ComplexArray, omega: float) -> floa
         loss = max(loss, uniform_loss + omega * mounts.damping, key=lambda matrix: float(np.linalg.eigvalsh(matrix)[0]))
     dynamic_stiffness = mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0].real
     highest = mounts.highest + max(float(np.linalg.eigvalsh(dynamic_stiffness)[-1]), 0.0)
-    # at rest, stiffness carries the load
-    moving_resistance = max(float(np.linalg.eigvalsh(loss)[0]), omega**2 - highest)
-    resistance = moving_resistance if omega > 0.0 else mounts.lowest
+    resistance = max(float(np.linalg.eigvalsh(loss)[0]), omega**2 - highest)
     return float(np.linalg.norm(loads, axis=1).sum()) / resistance if resistance > 0.0 else math.inf
 
 

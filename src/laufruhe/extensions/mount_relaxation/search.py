@@ -10,12 +10,10 @@ import numpy as np
 
 from laufruhe.extensions.mount_relaxation.box import BoxRelaxation
 from laufruhe.extensions.mount_relaxation.cone_program import Ahead
-from laufruhe.extensions.mount_relaxation.limits import limits_of
 from laufruhe.extensions.mount_relaxation.modes import mode_bases
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
 from laufruhe.extensions.mount_relaxation.orders import (
     EpigraphVariable,
-    MeasureOrders,
     Order,
     epigraph_variables,
     measure_orders,
@@ -30,7 +28,6 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -64,8 +61,6 @@ class SdpRelaxation:
         The best design as a point of the root box, without the coordinates of modes.
     modes, mode_sides
         Basis of each mode, shape (6, 6), and the slice of its coordinates in a box.
-    multiple_uppers
-        Upper bounds of the mean amplitude of odd multiples of orders over better designs, by the id of the multiple.
     ahead
         Executor that computes likely bounds ahead; None to compute everything in this process.
     """
@@ -106,21 +101,18 @@ class SdpRelaxation:
         fixed_terms = [term for term in problem.load_terms if not depends(term.measure.channel, kinds, problem)]
         self._constant = sum(term.weight * evaluation.value(term.measure) for term in fixed_terms)
 
-        def orders_of(measure: Measure, parts: Sequence[OpenMounts]) -> MeasureOrders:
-            return measure_orders(problem, measure, self._model, evaluation, basis, parts)
-
-        queries = [(term.weight, orders_of(term.measure, self._parts)) for term in mount_terms]
-        limits = limits_of(problem, evaluation, orders_of, self._parts)
+        queries = [
+            (term.weight, measure_orders(problem, term.measure, self._model, evaluation, basis, self._parts))
+            for term in mount_terms
+        ]
         loads = [order.loads[1:] for _, query in queries for order in query.orders]
-        self.basis, reduction = basis.reduced([*loads, *limits.loads])
+        self.basis, reduction = basis.reduced(loads)
         self._terms = [(weight, query.in_basis(reduction)) for weight, query in queries]
-        self.limits = limits.in_basis(reduction, self._parts)
         self._variables = [epigraph_variables(query, self._parts) for _, query in self._terms]
         self._reset()
 
     def _reset(self) -> None:
         self._roots = [np.zeros(len(variables)) for variables in self._variables]
-        self.multiple_uppers: dict[int, float] = {}
         self._last_box = self.lower, self.upper, self._roots[0]
 
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
@@ -217,7 +209,6 @@ class SdpRelaxation:
         ]
         relaxation._roots = [bounds.copy() for bounds in self._roots]
         relaxation._last_box = self.lower, self.upper, relaxation._roots[0]
-        relaxation.multiple_uppers = dict(self.multiple_uppers)
         return relaxation
 
     def up_to(self, value: float) -> SdpRelaxation:
@@ -232,8 +223,7 @@ class SdpRelaxation:
         count = len(self._reference)
         design = [float(v) for v in np.clip(self._reference, lower[:count], upper[:count])]
         mounting = mounting_in(self.problem.design(design, self.problem.mount_decisions))
-        moving = order.omega > 0.0
-        parts = (mounting.springs, mounting.losses * moving, mounting.dampers * order.omega)
+        parts = (mounting.springs, mounting.losses, mounting.dampers * order.omega)
         k, h, c = (mounts.root @ mounting.total(part) @ mounts.root.T for part in parts)
         load = order.loads[0] + self.basis.reference @ order.loads[1:]
         loads = np.column_stack([load, WIDE * order.loads[1:].T])

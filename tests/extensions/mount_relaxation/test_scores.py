@@ -1,0 +1,84 @@
+"""Branching scores of the relaxation of spring forces, and a half of the motions without open springs (E57, E62)."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from laufruhe.extensions.mount_relaxation.box import WORTH, joint_scores
+from laufruhe.files.reader import load
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+
+
+@pytest.mark.parametrize("lacking", [0.0, -1e-9, 5e-324, 1e-310])
+@pytest.mark.parametrize("size", [5e-324, 1e-305, 1.0, 1e9, 1e300])
+def test_sides_are_told_apart_where_nothing_is_lacking(lacking: float, size: float) -> None:
+    """Zero and the least numbers there are: no share overflows, which would be an error here, nor is one lost."""
+    hidden = size * np.array([0.0, 0.5, 1.0])
+    for pull in (np.zeros(3), np.array([5e-324, 0.0, 0.0])):
+        found = joint_scores(pull, hidden, lacking)
+        assert np.isfinite(found).all()
+        assert found[2] == found.max() > 0.0
+
+
+def test_what_is_hidden_counts_by_what_is_lacking() -> None:
+    pull, hidden = np.array([4.0, 1.0]), np.array([0.0, 3.0])
+    assert joint_scores(pull, hidden, 6.0) == pytest.approx([1.0, 3.0 / (6.0 * WORTH)])
+
+
+SIDEWAYS = """
+title = "Mirrored mounts, of which what gives way sideways is open"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+stroke = "90 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.8 kg"
+throws = [0]
+[[operating_points]]
+speed = "1500 rpm"
+[block]
+mass = "180 kg"
+centre_of_gravity = ["-60 mm", "0 mm", "25 mm"]
+inertia = ["8 kg m^2", "12 kg m^2", "13 kg m^2"]
+[mounts]
+kind = "elastic"
+loss_factor = 0.1
+[[mounts.places]]
+name = "front"
+position = ["320 mm", "200 mm", "0 mm"]
+stiffness = ["190 kN/m", { between = ["47 kN/m", "940 kN/m"], start = "180 kN/m" }, "99 kN/m"]
+[[mounts.places]]
+name = "front other"
+mirror_of = "front"
+[[mounts.places]]
+name = "rear"
+position = ["-350 mm", "160 mm", "-25 mm"]
+stiffness = ["125 kN/m", "330 kN/m", "225 kN/m"]
+[[mounts.places]]
+name = "rear other"
+mirror_of = "rear"
+[objective]
+minimise = "rms mount force"
+orders = [2]
+[[constraints]]
+limit = "natural frequencies"
+min = "1.5 Hz"
+"""
+
+
+def test_a_half_of_the_motions_may_have_nothing_open() -> None:
+    """Sideways, roll and yaw go together: the upright half of them has given stiffness alone."""
+    problem = load(tomllib.loads(SIDEWAYS))
+    result, given = solve(problem), evaluate(problem)
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    others = [with_mounts(given, problem.design([x])) for x in np.geomspace(47e3, 940e3, 30)]
+    minimum = min(objective_value(problem, each) for each in others if each.violation(problem.limits) <= 0.0)
+    assert result.certificate.lower_bound <= minimum
+    assert result.objective is not None
+    assert result.objective.value <= minimum * (1.0 + 1e-6)
