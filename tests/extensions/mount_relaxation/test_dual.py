@@ -2,18 +2,16 @@
 
 from typing import Any
 
-import clarabel
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
 from laufruhe.extensions.mount_relaxation.cone_solver import (
-    Cone,
     ConeSolver,
 )
 from laufruhe.extensions.mount_relaxation.program import RootTerm, SdpProgram
-from laufruhe.prove.mounts.dual_cones import column, matrix_of
+from laufruhe.prove.mounts.dual_cones import LENGTH, SIDES, ZERO, column, matrix_of
 
 SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
 SIZE, COUNT = 3, 4
@@ -47,16 +45,15 @@ class Program:
         right = [np.ones(2), bound @ inside, np.ones(2 * COUNT), slack + length @ inside]
         self.right = np.concatenate(right)
         self.cones = [
-            Cone(3, None, False),
-            Cone(2 * COUNT, clarabel.NonnegativeConeT(2 * COUNT), False),
-            Cone(4, clarabel.SecondOrderConeT(4), True),
+            (ZERO, 3),
+            (SIDES, 2 * COUNT),
+            (LENGTH, 4),
         ]
         self.costs = generator.normal(size=(3, width))
 
     def solver(self, is_dual: bool | None = None) -> ConeSolver:
         """By its dual, or as told."""
-        kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in self.matrices]
-        return ConeSolver(coo_array(self.rows), self.right, self.cones, kinds, SETTINGS, is_dual)
+        return ConeSolver(coo_array(self.rows), self.right, self.cones, self.matrices, SETTINGS, is_dual)
 
 
 @pytest.mark.parametrize("is_dual", [True, False])
@@ -84,7 +81,7 @@ def test_what_is_larger_stands_in_a_program_once() -> None:
     assert program.solver().is_dual
     program.rows = np.concatenate([program.rows, program.rows[-4:], program.rows[-4:]])
     program.right = np.concatenate([program.right, program.right[-4:], program.right[-4:]])
-    program.cones[-1:] = [Cone(12, clarabel.SecondOrderConeT(12), True)]
+    program.cones[-1:] = [(LENGTH, 12)]
     assert not program.solver().is_dual
 
 
@@ -99,9 +96,9 @@ def test_an_answer_does_not_depend_on_those_before(is_dual: bool) -> None:
 
 def test_a_root_is_proven_above_all_its_lengths() -> None:
     """Three lengths that nothing open changes."""
-    rows, none = np.random.default_rng(5).normal(size=(3, 2, 1)), np.zeros(0)
+    rows = np.random.default_rng(5).normal(size=(3, 2, 1))
     root = RootTerm(1.0, 0.1, 5.0, ((0, rows),))
-    program = SdpProgram((1,), (none,), 1, 0, np.zeros(1), np.array([25.0]), (), (), (), (), (root,), (), np.zeros(1))
+    program = SdpProgram((1,), (0.0,), 1, 0, np.zeros(1), np.array([25.0]), (), (), (), (root,), (), np.zeros(1))
     cones = ConeProgram(program)
     bound = cones.solve(cones.cost()).bound
     assert bound == pytest.approx(float(np.linalg.norm(rows[..., 0], axis=1).sum()), rel=1e-4)

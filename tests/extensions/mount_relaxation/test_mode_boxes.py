@@ -114,7 +114,7 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
 def of_mode(mode: ModeConstraints, count: int) -> SdpProgram:
     """A program of one mode and numbers alone."""
     none = np.zeros(0)
-    return SdpProgram((1,), (none,), count, 0, none, none, (), (), (), (), (), (mode,), np.zeros(count))
+    return SdpProgram((1,), (0.0,), count, 0, none, none, (), (), (), (), (mode,), np.zeros(count))
 
 
 @pytest.mark.parametrize("size", [1.0, 0.1, 0.0])

@@ -21,7 +21,7 @@ from uuid import uuid4
 import numpy as np
 from scipy.sparse import coo_array, csc_array, vstack
 
-from laufruhe.extensions.mount_relaxation.cone_solver import Cone, ConeSolver
+from laufruhe.extensions.mount_relaxation.cone_solver import ConeSolver
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.extensions.mount_relaxation.program import (
@@ -310,18 +310,8 @@ class ConeProgram:
     @cached_property
     def _solver(self) -> ConeSolver:
         """Clarabel solver that minimises any objective under these constraints."""
-        import clarabel
-
-        kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
-        cones = []
-        for cone, size in self.cones:
-            if cone == MATRIX:
-                # rows of the matrix from the size of its triangle
-                cones.append(Cone(size, clarabel.PSDTriangleConeT(math.isqrt(2 * size)), True))
-            else:
-                cones.append(Cone(size, None if cone == ZERO else kinds[cone](size), cone == LENGTH))
-        moments = [(self._moment(k), clarabel.PSDTriangleConeT(size)) for k, size in enumerate(self.program.sizes)]
-        return ConeSolver(self._matrix.tocoo(), np.concatenate(self.right), cones, moments, self._settings)
+        moments = [self._moment(k) for k in range(len(self.program.sizes))]
+        return ConeSolver(self._matrix.tocoo(), np.concatenate(self.right), self.cones, moments, self._settings)
 
 
 class _Cache(threading.local):

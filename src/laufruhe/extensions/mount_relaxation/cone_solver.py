@@ -13,7 +13,6 @@ cone alike.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,28 +20,11 @@ from scipy.sparse import coo_array, csc_array, diags_array, eye_array, vstack
 
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.budget import is_time_over
+from laufruhe.prove.mounts.dual_cones import LENGTH, MATRIX, ZERO
+from laufruhe.solvers.mounts.convex import clarabel_cone
 
 # rounds of scaling, and the range of scales
 _ROUNDS, _MIN_SCALE, _MAX_SCALE = 10, 1e-4, 1e4
-
-
-@dataclass(frozen=True, eq=False)
-class Cone:
-    """Cone constraint on consecutive rows of a cone program.
-
-    Attributes
-    ----------
-    size
-        Count of rows.
-    kind
-        Clarabel's cone; None for equations.
-    has_one_scale
-        True if all its rows need the same scale.
-    """
-
-    size: int
-    kind: Any
-    has_one_scale: bool
 
 
 class ConeSolver:
@@ -53,9 +35,9 @@ class ConeSolver:
     rows, right
         A, shape (m, n), and b, shape (m,).
     cones
-        K, in the order of the rows.
+        K: kind and count of rows of each cone. All rows of a length or of a matrix have one scale.
     matrices
-        Columns of each X_k and its cone; at least one.
+        Columns of each X_k; at least one.
     settings
         Settings of Clarabel.
     is_dual
@@ -64,34 +46,35 @@ class ConeSolver:
     """
 
     def __init__(
-        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
+        self, rows: Any, right: Array, cones: Sequence[tuple[str, int]], matrices: Sequence[Indices],
         settings: Mapping[str, Any], is_dual: bool | None = None,
     ) -> None:  # fmt: skip
         if is_dual is None:
-            matrix_size = sum(len(columns) ** 2 for columns, _ in matrices)
-            is_dual = matrix_size >= sum(cone.size**2 for cone in cones if cone.has_one_scale)
+            matrix_size = sum(len(columns) ** 2 for columns in matrices)
+            is_dual = matrix_size >= sum(count**2 for kind, count in cones if kind in (LENGTH, MATRIX))
         self.is_dual = is_dual
         self._settings = {**settings, "equilibrate_enable": False}
         self._row_scales, self._column_scales = _scales(rows, cones, matrices)
         scaled_rows = csc_array(diags_array(self._row_scales) @ rows @ diags_array(self._column_scales))
         self._right = self._row_scales * right
-        entries, (count, width) = np.concatenate([columns for columns, _ in matrices]), rows.shape
-        self._kinds = [kind for _, kind in matrices]
+        entries, (count, width) = np.concatenate(matrices), rows.shape
+        kinds = [(MATRIX, len(columns)) for columns in matrices]
         if is_dual:
             free_count = width - len(entries)
             self._order = np.concatenate([np.setdiff1d(np.arange(width), entries), entries])
             self._signs = np.where(np.arange(width) < free_count, 1.0, -1.0)
             inequality_rows = np.flatnonzero(
-                np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones])
+                np.repeat([kind != ZERO for kind, _ in cones], [size for _, size in cones])
             )
             transposed = diags_array(self._signs) @ scaled_rows[:, self._order].T
             added: Any = -eye_array(count, format="csr")[inequality_rows]
             self._rows = csc_array(vstack([transposed, added]))
-            self._kinds = [_zero_cone(free_count), *self._kinds, *(c.kind for c in cones if c.kind is not None)]
+            kinds = [(ZERO, free_count), *kinds, *(cone for cone in cones if cone[0] != ZERO)]
         else:
             added = coo_array((-np.ones(len(entries)), (np.arange(len(entries)), entries)), (len(entries), width))
             self._rows = csc_array(vstack([scaled_rows, added]))
-            self._kinds = [*(_zero_cone(c.size) if c.kind is None else c.kind for c in cones), *self._kinds]
+            kinds = [*cones, *kinds]
+        self._cones = [clarabel_cone(*cone) for cone in kinds]
         self._zeros = np.zeros(added.shape[0])
         self._solver: Any = None
 
@@ -106,7 +89,7 @@ class ConeSolver:
         else:
             vectors = {"q": scaled, "b": np.append(self._right, self._zeros)}
         if self._solver is None:
-            self._solver = new_solver(vectors["q"], self._rows, vectors["b"], self._kinds, self._settings)
+            self._solver = new_solver(vectors["q"], self._rows, vectors["b"], self._cones, self._settings)
         else:
             self._solver.update(**vectors)
         solution = self._solver.solve()
@@ -131,19 +114,13 @@ def new_solver(cost: Array, rows: Any, right: Array, cones: Sequence[Any], setti
     return solver
 
 
-def _zero_cone(size: int) -> Any:
-    import clarabel
-
-    return clarabel.ZeroConeT(size)
-
-
-def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]]) -> tuple[Array, Array]:
+def _scales(rows: Any, cones: Sequence[tuple[str, int]], matrices: Sequence[Indices]) -> tuple[Array, Array]:
     """Return scales of rows, (m,), and columns, (n,), that make the program's numbers alike in size.
 
     Each entry of a matrix X_k counts as a row too.
     """
     count, width = rows.shape
-    entries = np.concatenate([columns for columns, _ in matrices])
+    entries = np.concatenate(matrices)
     row = np.append(rows.row, count + np.arange(len(entries)))
     column = np.append(rows.col, entries)
     sizes = np.append(np.abs(rows.data), np.ones(len(entries)))
@@ -160,9 +137,8 @@ def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, 
             scales[k][numbers] /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
             scales[k] = np.clip(scales[k], _MIN_SCALE, _MAX_SCALE)
     start, (row_scales, column_scales) = 0, scales
-    blocks = [(cone.size, cone.has_one_scale) for cone in cones] + [(len(columns), True) for columns, _ in matrices]
-    for size, has_one_scale in blocks:
-        if has_one_scale:
+    for kind, size in (*cones, *((MATRIX, len(columns)) for columns in matrices)):
+        if kind in (LENGTH, MATRIX):
             row_scales[start : start + size] = row_scales[start : start + size].mean()
         start += size
     column_scales[entries] = 1.0 / row_scales[count:]

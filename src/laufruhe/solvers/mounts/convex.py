@@ -33,7 +33,7 @@ from laufruhe.problem.measure import Limit, Measure, Side, Term
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.prove.mounts.dual_cones import LENGTH, MATRIX, SIDES, column, in_dual_cones
+from laufruhe.prove.mounts.dual_cones import LENGTH, MATRIX, SIDES, ZERO, column, in_dual_cones
 from laufruhe.solvers.conclusion import (
     ProofData,
     build_result,
@@ -91,6 +91,16 @@ class Block:
     size: float
     free: Array
     span: tuple[float, float] = (0.0, 0.0)
+
+
+def clarabel_cone(kind: str, count: int) -> Any:
+    """Return Clarabel's cone of a kind, by its count of rows."""
+    import clarabel
+
+    if kind == MATRIX:
+        return clarabel.PSDTriangleConeT(math.isqrt(2 * count))
+    kinds = {ZERO: clarabel.ZeroConeT, SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
+    return kinds[kind](count)
 
 
 class ConvexProgram:
@@ -185,19 +195,12 @@ class ConvexProgram:
 
     def solve(self) -> tuple[Array, Array] | None:
         """Return stiffnesses [N/m], shape (n,), and multipliers; None if these prove that the limits contradict."""
-        import clarabel
-
-        kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
         rows, count, n = ConeRows(len(self._cost)), len(self._right), len(self.half)
         rows.add(np.arange(count), np.arange(len(self._cost))[:, None], self._rows, self._right)
         bounded = np.delete(np.arange(len(self._cost)), np.s_[n : n + len(self.terms)])
         for sign, edges in ((1.0, self._high), (-1.0, -self._low)):
             rows.add(np.arange(len(bounded)), bounded, sign, edges[bounded])
-        rows.cones += [
-            clarabel.PSDTriangleConeT(math.isqrt(2 * size)) if kind == MATRIX else kinds[kind](size)
-            for kind, size in self._cones
-        ]
-        rows.cones.append(clarabel.NonnegativeConeT(2 * len(bounded)))
+        rows.cones += [clarabel_cone(*cone) for cone in (*self._cones, (SIDES, 2 * len(bounded)))]
         for settings in (TIGHT, *ATTEMPTS):
             raw = run_clarabel(rows, self._cost, settings)
             x, z = (np.nan_to_num(np.array(part)) for part in (raw.x, raw.z))
