@@ -75,17 +75,28 @@ def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentCon
 def _spring_constraints(
     numbers: int, spring: SpringTerm, deflection: ComplexArray, force: ComplexArray
 ) -> list[MomentConstraint]:
-    """Return the constraints on an open spring: its stiffness lies between bounds (E43).
+    """Return the constraints on an open spring: its stiffness and its force lie between bounds (E53).
 
     Deflection u and force t, the product of stiffness and u, have coefficients of (1, v), shape (b, d) each (E42).
     """
     slopes = spring.slopes(numbers) / spring.size
-    return [
+    constraints = [
         product_constraint(
             constant / spring.size, sign * slopes, deflection, (constant @ deflection + sign * force) / spring.size
         )
         for constant, sign in spring.sides
     ]
+    for below, above in spring.spans:
+        first, second = (below @ deflection + force) / spring.size, (above @ deflection - force) / spring.size
+        if len(deflection) > 1:
+            moments = product(first, second)[None, None]
+        else:
+            # products of real and imaginary parts, pair by pair
+            rows = [np.concatenate([part.real, part.imag]) for part in (first, second)]
+            moments = _symmetrised(np.einsum("ax,by->abxy", *rows))
+        size = float(np.linalg.norm(first) * np.linalg.norm(second))
+        constraints.append(_of_moments(numbers, moments, size))
+    return constraints
 
 
 def _symmetrised(products: Array) -> Array:

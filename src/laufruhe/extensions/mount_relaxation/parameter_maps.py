@@ -56,6 +56,8 @@ class SpringTerm:
         Pairs of a number j and its matrix, shape (b, b) [N/m or N s/m].
     sides
         Pairs of a matrix C and a sign: C + sign * sum is positive semidefinite.
+    spans
+        Pairs of matrices C and D: (C + sum)(D - sum) is positive semidefinite.
     size
         Size of the sum [N/m or N s/m].
     elastic, viscous
@@ -66,6 +68,7 @@ class SpringTerm:
     axes: Array
     terms: tuple[tuple[int, Array], ...]
     sides: tuple[tuple[Array, float], ...]
+    spans: tuple[tuple[Array, Array], ...]
     size: float
     elastic: float = 1.0
     viscous: float = 0.0
@@ -243,7 +246,7 @@ class ParameterMaps:
                 )
                 bound = np.array([[reach[i]]])
                 sides = (bound, 1.0), (bound, -1.0)
-                springs.append(SpringTerm(m, axes[i][:, None], terms, sides, float(reach[i])))
+                springs.append(SpringTerm(m, axes[i][:, None], terms, sides, ((bound, bound),), float(reach[i])))
         return total, springs
 
     def _in_plane(self, m: int, axes: Array, pair: list[int], kind: slice) -> tuple[Array, list[SpringTerm]]:
@@ -264,10 +267,13 @@ class ParameterMaps:
         ratio = math.sqrt((halves[0] + ZERO_RANGE * high) / (halves[1] + ZERO_RANGE * high))
         box_bound = np.diag([halves[0] + ratio * halves[2], halves[1] + halves[2] / ratio])
         size = float(halves.max()) or 1.0
+        radius = float(np.linalg.norm(np.array([[halves[0], halves[2]], [halves[2], halves[1]]]), 2))
         sides = [(centre - low * np.eye(2), 1.0), (high * np.eye(2) - centre, -1.0)]
+        spans = [(sides[0][0], sides[1][0])]
         if self._boxes is not None:
             sides += [(box_bound, 1.0), (box_bound, -1.0)]
-        spring = SpringTerm(m, axes[pair].T, terms, tuple(sides), size)
+            spans += [(radius * np.eye(2), radius * np.eye(2))]
+        spring = SpringTerm(m, axes[pair].T, terms, tuple(sides), tuple(spans), size)
         upper = min(high * np.eye(2), centre + box_bound, key=lambda matrix: float(np.trace(matrix)))
         third_axis = np.delete(axes, pair, axis=0)
         third_axis_terms = [
@@ -312,7 +318,7 @@ class ParameterMaps:
             terms.append((self._number(("space", kind.start, m, a, b), decisions), matrix))
         side = half * np.eye(3)
         middle = 0.5 * (low + high) * np.eye(3)
-        return middle, [SpringTerm(m, np.eye(3), tuple(terms), ((side, 1.0), (side, -1.0)), half)]
+        return middle, [SpringTerm(m, np.eye(3), tuple(terms), ((side, 1.0), (side, -1.0)), ((side, side),), half)]
 
     def bounds(self, m: int, kind: slice) -> tuple[Array, Array]:
         """Return lower and upper bounds of stiffness or damping, shape (3, 3) each; call `springs` first."""
