@@ -309,7 +309,6 @@ class ConeProgram:
 
     @cached_property
     def _solver(self) -> ConeSolver:
-        """Clarabel solver that minimises any objective under these constraints."""
         moments = [self._moment(k) for k in range(len(self.program.sizes))]
         return ConeSolver(self._matrix.tocoo(), np.concatenate(self.right), self.cones, moments, self._settings)
 
