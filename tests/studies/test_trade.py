@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import laufruhe
@@ -18,7 +19,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.trade import advice, choices, trade_document
-from laufruhe.studies.trade import Trade, TradeRow, timed, trade
+from laufruhe.studies.trade import Trade, TradeRow, peak_memory, timed, trade
 from problem_files import PROBLEMS
 
 
@@ -65,6 +66,10 @@ def test_a_call_is_repeated_unless_it_takes_seconds(first: float, calls: int, mo
 
     assert timed(work)[1] == pytest.approx(first if calls == 1 else 0.8 * first)
     assert count == calls
+
+
+def test_the_memory_of_a_call_is_its_largest_and_not_what_it_leaves() -> None:
+    assert 8_000_000 <= peak_memory(lambda: float(np.zeros(1_000_000).sum())) < 9_000_000
 
 
 @pytest.mark.slow
