@@ -128,29 +128,33 @@ class UnevenModel:
         blocks: list[Any] = []
         weights: list[Array] = []
         if measure.norm.is_euclidean:
-            for point, (load, places) in zip(chosen, by_point, strict=True):
+            for point, (load, basis, places) in zip(chosen, by_point, strict=True):
                 half = np.where(load.orders == 0.0, 1.0, 0.5) * point.weight / total_weight / places
                 for part in (load.real, load.imaginary):
-                    blocks += ca.horzsplit(part.T, part.shape[0] // places)
+                    blocks += ca.horzsplit(part.T @ basis, basis.shape[1] // places)
                 weights += [half] * (2 * places)
             return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
         # orders differ between points: all have the samples that the highest order needs
-        highest = max(float(load.orders.max()) / load.base for load, _ in by_point)
+        highest = max(float(load.orders.max()) / load.base for load, _, _ in by_point)
         steps = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
-        for point, (load, places) in zip(chosen, by_point, strict=True):
-            blocks += ca.horzsplit(load.sampled(steps), load.real.shape[0] // places)
+        for point, (load, basis, places) in zip(chosen, by_point, strict=True):
+            blocks += ca.horzsplit(load.sampled(steps) @ basis, basis.shape[1] // places)
             weights.append(np.full(places * steps, point.weight / total_weight / places / steps))
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
     def wrench(self, point: OperatingPoint) -> SymbolicSpectrum:
         """Return the symbolic wrench on the block at an operating point."""
-        return self._load(point, lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :]))[0]
+        load, basis, _ = self._load(point, lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :]))
+        return load.mapped(basis.full().T)
 
-    def _load(self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum]) -> tuple[SymbolicSpectrum, int]:
-        """Return a load at one operating point as an expression of throw and bank angles, and its number of places.
+    def _load(
+        self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum]
+    ) -> tuple[SymbolicSpectrum, Any, int]:
+        """Return a load at one operating point as an expression of throw and bank angles, its basis and its places.
 
-        `signal` is a function from the loads of an engine to the load, shape (n, places, d). Places are mounts, parts
-        of the crankcase, or the block; the spectrum has the components of all places one after another.
+        `signal` is a function from the loads of an engine to the load, shape (n, places, d). The r components of the
+        spectrum times the basis, shape (r, places d), are those of all places, which are mounts, parts of the
+        crankcase, or the block.
         """
         p = self.problem.points.index(point)
         signals = [signal(part.loads[p]).series.truncated(HIGHEST) for parts, _, _ in self._sources for part in parts]
@@ -159,17 +163,25 @@ class UnevenModel:
         stacked = stacked.reshape(*stacked.shape[:2], places * d)
         count = self._gas_and_inertia
         is_needed = _needed_orders(np.square(np.abs(stacked[:count])).sum(axis=0)) | stacked[count:].any(axis=(0, 2))
+        # forces on rigid mounts have no more independent components than the wrench
+        flat = np.concatenate([stacked.real, stacked.imag]).reshape(-1, places * d)
+        _, sizes, vectors = np.linalg.svd(
+            flat / (np.abs(flat).max(axis=1, keepdims=True) + 1e-300), full_matrices=False
+        )
+        basis = vectors[: max(int((sizes > _NEGLIGIBLE * sizes[0]).sum()), 1)]
+        stacked = stacked @ basis.T
         orders, rows = np.asarray(np.flatnonzero(is_needed) * float(base)), iter(stacked[:, is_needed])
-        real, imaginary = ca.DM(places * d, len(orders)), ca.DM(places * d, len(orders))
+        size = basis.shape[0]
+        real, imaginary = ca.DM(size, len(orders)), ca.DM(size, len(orders))
         for parts, factors, angle in self._sources:
             values = tuple(next(rows) for _ in parts)
             terms = split_by_bank(*values) if len(values) == len(BANK_SAMPLES) else values
             a = sum(_dm(coefficients.real.T) * factor for coefficients, factor in zip(terms, factors, strict=True))
             b = sum(_dm(coefficients.imag.T) * factor for coefficients, factor in zip(terms, factors, strict=True))
             phases = ca.DM(orders).T * angle
-            cosine, sine = (ca.repmat(wave(phases), places * d, 1) for wave in (ca.cos, ca.sin))
+            cosine, sine = (ca.repmat(wave(phases), size, 1) for wave in (ca.cos, ca.sin))
             real, imaginary = real + a * cosine - b * sine, imaginary + a * sine + b * cosine
-        return SymbolicSpectrum(orders, real, imaginary), places
+        return SymbolicSpectrum(orders, real, imaginary), ca.DM(basis), places
 
     def _unbalance(self, rotor: Rotor) -> Any:
         """Return the unbalance of a rotor as expressions (re, im) [kg m], at the present angle of its throw."""
