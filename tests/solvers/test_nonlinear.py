@@ -11,8 +11,6 @@ from scipy.optimize import minimize
 
 from laufruhe.numerics.budget import limit_time
 from laufruhe.numerics.norms import softened_lengths
-from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.solvers.mounts.starts import spread_starts
 from laufruhe.solvers.smooth.ipopt import Task, _kkt_residual
 from laufruhe.solvers.smooth.local_optimum import Ending, describe_starts, distinct_optima, is_explored
@@ -237,25 +235,6 @@ def test_a_search_ends_when_nothing_better_is_to_be_expected():
     assert 13 < sum(o.starts for o in tried[1]) <= 25
     assert tried[1][0].starts > 1
     assert tried[1][0].value == pytest.approx(solve_nonlinear(waves(), starts, workers=1)[0].value, abs=1e-9)
-
-
-@pytest.mark.slow
-def test_workers_at_hand_find_what_one_process_finds():
-    """They begin with starts before it is known that these will be wanted; those that are not do not count."""
-    x = ca.SX.sym("x", 1)
-    bowl = NonlinearProgram(x, (x[0] - 0.3) ** 2, np.array([-4.0]), np.array([4.0]))
-    starts, found = spread_starts(np.array([-4.0]), np.array([4.0]), 60), []
-    with Processes(3) as own:
-        for executor in (SERIAL, own):
-            with working_on(executor):
-                for program, maximum in ((bowl, 1), (bowl, 7), (waves(0.3), 13)):
-                    ends = solve_nonlinear(
-                        program, starts, stop_when=lambda some, n=maximum: sum(o.starts for o in some) >= n
-                    )
-                    found.append([(o.start, o.starts, o.value, *o.x) for o in ends])
-        assert len(own.pids) == 3
-    assert found[:3] == found[3:]
-    assert [sum(end[1] for end in ends) for ends in found[:3]] == [1, 7, 13]
 
 
 def test_an_optimum_that_one_start_met_is_not_the_last_word():
