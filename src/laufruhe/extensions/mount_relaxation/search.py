@@ -33,6 +33,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import GAP_SAFETY
 from laufruhe.prove.mounts.ranges import number_ranges
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_problem
 
 # total work of the relaxations, each its number of moments to the power EFFORT, and the most relaxations
 WORK, EFFORT, MAX_BOXES = 6e7, 5, 100
@@ -91,6 +92,7 @@ class SdpRelaxation:
         ones = np.ones(5 * len(self.modes))
         self.lower, self.upper = np.append(lower, -ones), np.append(upper, ones)
         self.mode_sides = [slice(len(lower) + 5 * k, len(lower) + 5 * (k + 1)) for k in range(len(self.modes))]
+        self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * gap_tolerance) if is_stiffness_problem(problem) else None
         self._model = AffineModel(off_resonance(problem))
         unbalances = [v for v, d in zip(reference, problem.decisions, strict=True) if d.is_affine]
         basis = unbalance_basis(self._model.domains, unbalances)
@@ -156,7 +158,8 @@ class SdpRelaxation:
     @property
     def is_sampled_fully(self) -> bool:
         """True if bounds by orders are also bounds of the sampled norms."""
-        return all(query.is_sampled_fully for _, query in self._terms)
+        plain = self._stiffness_boxes is None or self._stiffness_boxes.is_sampled_fully
+        return plain and all(query.is_sampled_fully for _, query in self._terms)
 
     @property
     def max_boxes(self) -> int:
@@ -167,7 +170,12 @@ class SdpRelaxation:
 
     def bound(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """Return a lower bound of the objective on a box [SI], and branching scores of its sides, shape (n,)."""
-        total, scores = self._constant, np.zeros(len(lower))
+        total, scores, stiffness_bound = self._constant, np.zeros(len(lower)), 0.0
+        if self._stiffness_boxes is not None:
+            count = self.mount_numbers
+            stiffness_bound = float(self._stiffness_boxes.bounds(lower[None, :count], upper[None, :count])[0][0])
+            if stiffness_bound >= self.cutoff:
+                return stiffness_bound, scores
         for k, (weight, _) in enumerate(self._terms):
             box = self._box(k, lower, upper)
             bound, term_scores = box.bound(self._variables[k], self._roots[k])
@@ -175,7 +183,7 @@ class SdpRelaxation:
                 self._last_box = lower, upper, box.roots
             total += weight * bound
             scores += term_scores
-        return total, scores * (upper > lower)
+        return max(stiffness_bound, total), scores * (upper > lower)
 
     def _box(self, term: int, lower: Array, upper: Array) -> BoxRelaxation:
         weight, query = self._terms[term]
