@@ -98,7 +98,13 @@ _OF_SIZES = (
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
-    "commands": {"page": "served_page", "balance": "balancing", "drawing": "workshop", "export": "exchange"},
+    "commands": {
+        "page": "served_page",
+        "balance": "balancing",
+        "drawing": "workshop",
+        "export": "exchange",
+        "identify": "identification",
+    },
     "keys": {
         "torsion": "torsion",
         "tolerances": "robust",
@@ -111,6 +117,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "frame": "receivers",
         "bob_weights": "balancing",
         "correction": "balancing",
+        "measurements": "identification",
     },
     "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 
-from laufruhe.files.complaints import Refused, errors_at_key
+from laufruhe.files.complaints import Refused, errors_at_key, require_distinct
 from laufruhe.files.number_tables import NumberTable, number_table
+from laufruhe.numerics.arrays import Array, ComplexArray
 
 MAX_ROWS, MAX_BYTES = 100_000, 30_000_000
+# headings of the two columns of a complex number, and True if they are its amount and its angle
+_PARTS = (("real", "imaginary", False), ("magnitude", "phase", True), ("amplitude", "phase", True))
 
 
 def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:
@@ -41,3 +45,24 @@ def table_of(file: str, path: Path, key: str, sheet: str | None = None) -> Numbe
         raise Refused(key, file, f"is larger than {MAX_BYTES // 1_000_000} MB", "remove rows")
     with errors_at_key(key, file):
         return number_table(content, path.suffix.lower(), sheet)
+
+
+def named_columns(file: str, table: NumberTable, where: str) -> dict[str, Array]:
+    """Return the columns of a table by their headings without units, in lower case; angles in radians."""
+    names = [" ".join(re.sub(r"[\[(].*?[\])]", " ", name).casefold().split()) for name in table.names]
+    require_distinct(names, where, f"columns of {file} have one name")
+    factors = [
+        np.pi / 180.0 if name.endswith("phase") and (unit is None or unit.name != "rad") else 1.0
+        for name, unit in zip(names, table.units, strict=True)
+    ]
+    return {name: factor * column for name, factor, column in zip(names, factors, table.values.T, strict=True)}
+
+
+def take_complex(place: str, columns: dict[str, Array]) -> ComplexArray | None:
+    """Remove the two columns of a complex number from `columns`, and return it; None if there are no such columns."""
+    for first, second, is_polar in _PARTS:
+        names = [f"{place} {part}".strip().casefold() for part in (first, second)]
+        if all(name in columns for name in names):
+            one, other = (columns.pop(name) for name in names)
+            return np.asarray(one * np.exp(1j * other) if is_polar else one + 1j * other)
+    return None

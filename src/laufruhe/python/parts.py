@@ -208,6 +208,16 @@ class EngineParts(Parts):
         """Return the engine with correction. Holes and slugs that correct the unbalance of a rotor in two planes."""
         return self._with("correction", "correction", keys_of(locals()))
 
+    def measurement(
+        self, *, file: str, quantity: str | None = None, unit: str | None = None, deviation: Number | None = None,
+        values: Table | None = None,
+    ) -> Self:
+        """Return the engine with a measurement.
+
+        Orders that were measured in one run, to identify the open numbers of the file.
+        """
+        return self._with("measurements", "measurement", keys_of(locals()))
+
     def frame(
         self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None,
         inertia_products: Values | None = None, springs: Sequence[Table] | None = None,

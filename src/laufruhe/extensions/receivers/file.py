@@ -15,7 +15,7 @@ from laufruhe.extensions.receivers.machine import Curve, Frame, FrequencyFunctio
 from laufruhe.extensions.receivers.weightings import WEIGHTINGS
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, nearest, require_distinct, require_one_of
-from laufruhe.files.csv_rows import MAX_ROWS, table_of
+from laufruhe.files.csv_rows import MAX_ROWS, named_columns, table_of, take_complex
 from laufruhe.files.fields import ListOrSingle, Name, Number, Table
 from laufruhe.files.problem_file import ExtensionContext, Key
 from laufruhe.machine import Block, Engine, Mount
@@ -25,8 +25,6 @@ from laufruhe.problem.problem import Problem
 Frequency: TypeAlias = Annotated[float, Number("Hz", minimum=0.0)]
 _QUANTITIES: dict[str, Quantity] = {"m/s^2": "acceleration", "m/s": "velocity", "Pa": "pressure"}
 _AXES = ("x", "y", "z")
-# headings of the two columns of a complex number, and True if they are its amount and its angle
-_PARTS = (("real", "imaginary", False), ("magnitude", "phase", True))
 _UNWEIGHTED = "none"
 
 
@@ -189,8 +187,8 @@ def _check_band(table: ReceiverTable, band: tuple[float, float], curve: Frequenc
         raise Refused(f"{where}.band", table.band, rule, "narrow the band, or measure more frequencies")
 
 
-def _columns(file: str, folder: Path, where: str) -> tuple[dict[str, Array], frozenset[str]]:
-    """Return the columns of a file by their headings without units, frequency first, and those in radians."""
+def _columns(file: str, folder: Path, where: str) -> dict[str, Array]:
+    """Return the columns of a file by their headings without units, with the frequencies as "frequency"."""
     numbers = table_of(file, folder / file, where)
     if len(numbers.values) < 2 or len(numbers.values) > MAX_ROWS or np.isnan(numbers.values).any():
         rule = f"has fewer than two rows, more than {MAX_ROWS}, or gaps"
@@ -202,21 +200,16 @@ def _columns(file: str, folder: Path, where: str) -> tuple[dict[str, Array], fro
         raise Refused(where, file, f"has '{first}' as its first column", "make it frequency [Hz]")
     if frequencies[0] < 0.0 or np.any(np.diff(frequencies) <= 0.0):
         raise Refused(where, file, "has frequencies that do not rise", "sort its rows by frequency, each once")
-    plain = [re.sub(r"[\[(].*?[\])]", " ", name).casefold().split() for name in numbers.names]
-    names = ["frequency", *(" ".join(words) for words in plain[1:])]
-    require_distinct(names, where, f"columns of {file} have one name")
-    radians = frozenset(
-        name for name, unit in zip(names, numbers.units, strict=True) if unit is not None and unit.name == "rad"
-    )
-    return dict(zip(names, numbers.values.T, strict=True)), radians
+    columns = list(named_columns(file, numbers, where).items())
+    return {"frequency": frequencies, **dict(columns[1:])}
 
 
 def _transfer_function(file: str, engine: Engine, folder: Path, where: str) -> FrequencyFunction:
     """Return the transfer function of one component from a file with two columns for each mount and direction."""
-    columns, radians = _columns(file, folder, where)
+    columns = _columns(file, folder, where)
     values = []
     for place in (f"{mount.name} {axis}" for mount in engine.mounts for axis in _AXES):
-        values_at_place = _complex_column(place.casefold(), columns, radians)
+        values_at_place = take_complex(place, columns)
         if values_at_place is None:
             remedy = f"add '{place} real' and '{place} imaginary', or '{place} magnitude' and '{place} phase [deg]'"
             raise Refused(where, file, f"has no columns for the force on mount {place}", f"{remedy}, zeros for none")
@@ -226,16 +219,6 @@ def _transfer_function(file: str, engine: Engine, folder: Path, where: str) -> F
         rule = f"has a column '{next(iter(columns))}', which is no part of a force on a mount of this engine"
         raise Refused(where, file, rule, f"name columns as '{engine.mounts[0].name} z real', or remove it")
     return _function(file, frequencies, np.stack(values, axis=1))
-
-
-def _complex_column(place: str, columns: dict[str, Array], radians: frozenset[str]) -> ComplexArray | None:
-    for first, second, is_polar in _PARTS:
-        a, b = f"{place} {first}", f"{place} {second}"
-        if a in columns and b in columns:
-            one, other = columns.pop(a), columns.pop(b)
-            angle = other if b in radians else np.radians(other)
-            return np.asarray(one * np.exp(1j * angle) if is_polar else one + 1j * other)
-    return None
 
 
 def _function(file: str, frequencies: Array, values: ComplexArray) -> FrequencyFunction:
@@ -254,7 +237,7 @@ def _weightings(table: ReceiverTable, count: int, folder: Path, where: str) -> t
             remedy = nearest(word, [*WEIGHTINGS, _UNWEIGHTED])
             raise Refused(where, word, "is no weighting and no file beside the problem", remedy)
         else:
-            columns, _ = _columns(word, folder, where)
+            columns = _columns(word, folder, where)
             frequencies = columns.pop("frequency")
             if list(columns) != ["factor"]:
                 raise Refused(where, word, "has other columns than frequency and factor", "give these two")
