@@ -6,12 +6,13 @@ import math
 from collections.abc import Sequence
 
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, OperatingPoint, Role, Rotor, Seiliger, Shaft
-from laufruhe.machine.layouts import Mechanism, build, inline
+from laufruhe.machine.layouts import build, inline
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, Limit, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Sector
+from mechanisms import mechanism_of
 
 RADIUS, LAMBDA, MASS, SPACING = 0.06, 0.26, 1.25, 0.125
 SPEED = 2500 * math.pi / 30
@@ -37,7 +38,7 @@ def engine(
     firing_order: Sequence[int] | None = None,
 ) -> Engine:
     """The tractor engine with these throws."""
-    mechanism = Mechanism(RADIUS, RADIUS / LAMBDA, MASS, bore=0.1)
+    mechanism = mechanism_of(RADIUS, RADIUS / LAMBDA, MASS, bore=0.1)
     layout = inline(len(throws_deg), SPACING)
     cylinders, _ = build(cycle, layout, mechanism, [math.radians(t) for t in throws_deg], firing_order)
     return Engine("tractor", cycle, cylinders, tuple(rotors), mounts(len(throws_deg)))

@@ -26,7 +26,7 @@ from laufruhe import load  # noqa: E402
 from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE  # noqa: E402
 from laufruhe.load_models.batch import prepare  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
-from laufruhe.machine.layouts import Mechanism, build, inline  # noqa: E402
+from laufruhe.machine.layouts import build, inline  # noqa: E402
 from laufruhe.numerics.norms import NORMS  # noqa: E402
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
@@ -35,6 +35,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
 from laufruhe.problem.measure import Measure, Term  # noqa: E402
 from laufruhe.problem.problem import Problem  # noqa: E402
 from laufruhe.solvers import solve  # noqa: E402
+from mechanisms import mechanism_of  # noqa: E402
 from random_decisions import random_decisions  # noqa: E402
 
 OUT = PAGES / "fidelity.md"
@@ -138,7 +139,7 @@ def _mounts(count: int) -> tuple[Mount, ...]:
 
 def _row(cylinders: int, mounts: int, samples: int, orders: int | None) -> Callable[[], object]:
     throws = [2.0 * math.pi * k * 0.37 for k in range(cylinders)]
-    parts, _ = build(Cycle.FOUR_STROKE, inline(cylinders, 0.1), Mechanism(0.04, 0.11, 0.5), throws)
+    parts, _ = build(Cycle.FOUR_STROKE, inline(cylinders, 0.1), mechanism_of(0.04, 0.11, 0.5), throws)
     engine = Engine("row", Cycle.FOUR_STROKE, parts, (), _mounts(mounts))
     problem = Problem("row", "row", engine, (OperatingPoint("p", 300.0),), objective=(_mean(),),
                       fidelity=Fidelity(samples=samples, orders=orders))  # fmt: skip

@@ -13,15 +13,12 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import BoundError
-from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.witness import STRICT, check_bound, collected
 from laufruhe.numerics.workers import unordered_map
 from laufruhe.prove import certificate
-from laufruhe.prove.boxes.leads import LeadBoxes
 from laufruhe.prove.boxes.monotone import MonotoneProblem
-from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.prove.throws.star_cuts import Cut
@@ -78,7 +75,6 @@ BROKEN = {
     "windows of throws": ("inline-nine-uneven", scaled(uneven_throws, "uneven_bound", lambda found: found + 1e3)),
     "throws": ("steam-two-crank", scaled(ThrowPrograms, "_bound", first_times(1.02))),
     "the flywheel": ("scotch-yoke-steam-pump", scaled(MonotoneProblem, "minimum_over", times(1.02))),
-    "leads": ("geared-three-leads", scaled(LeadBoxes, "bound", value_times(1.01))),
     "places": ("tractor-four-shaft-heights", scaled(places.PlaceSearch, "box", bound_times(1.01))),
     "matrix inequalities": ("powertrain-torque-roll", scaled(ConvexProgram, "bound", first_times(1.001))),
 }
@@ -104,17 +100,6 @@ def test_a_broken_bounder_by_expansions(monkeypatch: pytest.MonkeyPatch) -> None
     scaled(StiffnessBoxes, "bounds", first_times(1.001))(monkeypatch)
     with pytest.raises(BoundError, match="boxes of stiffness"):
         divided_bound(problem, design.value, 1e-4 * design.value, known)
-
-
-@pytest.mark.slow
-def test_a_broken_bounder_of_leads_between_shared_chambers(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = dict(tables_of(PROBLEMS / "opposed-pistons-lead.toml"))
-    told.pop("counterweights", None)
-    told["engine"] = {**told["engine"], "crank_lead": {"between": [4, 16]}}
-    told |= {"objective": {"minimise": "rms roll moment"}, "tolerance": 1e-2, "fidelity": {"samples": 180}}
-    scaled(SharedGasBoxes, "_bound", times(1.01))(monkeypatch)
-    with pytest.raises(BoundError):
-        laufruhe.solve(load_tables(told, Path("shared.toml")))
 
 
 def test_a_proof_that_contradicts_a_design_is_withheld(monkeypatch: pytest.MonkeyPatch) -> None:

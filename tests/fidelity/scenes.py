@@ -7,11 +7,12 @@ import random
 from dataclasses import replace
 
 from laufruhe.machine import Block, Cycle, Engine, GasModel, Mount, OperatingPoint, Rotor, Seiliger, Shaft, Wiebe
-from laufruhe.machine.layouts import Mechanism, build, inline, vee
+from laufruhe.machine.layouts import build, inline, vee
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
+from mechanisms import mechanism_of
 
 SUBJECTS = (channels.MOUNT_FORCE, channels.SHAKING_FORCE, channels.ROLL_MOMENT, channels.ROCKING_COUPLE)
 
@@ -21,7 +22,7 @@ def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
     count, cycle = rng.randint(1, 8), rng.choice(list(Cycle))
     radius = rng.uniform(0.02, 0.1)
     ratio = rng.uniform(0.05, 0.5)
-    mechanism = Mechanism(
+    mechanism = mechanism_of(
         radius, radius / ratio, rng.uniform(0.1, 5.0), rotating_mass=rng.choice([0.0, rng.uniform(0.1, 3.0)]),
         rod_inertia_deficit=rng.choice([0.0, rng.uniform(-0.01, 0.01)]),
         offset=rng.choice([0.0, rng.uniform(-0.1, 0.1) * radius]), bore=rng.uniform(0.05, 0.15),

@@ -247,7 +247,7 @@ BAD = [
     bad("mass without a unit", 'max = "4 kg"', "max = 4",
         'constraints[1].max = 4: has no unit, a mass needs one; write for example "1.25 kg"'),
     bad("weights of a moment", '"mean mount force"', "\"mean roll moment\"\ndirection_weights = [1, 1, 0]",
-        "objective.direction_weights: is for forces and travels at places, not for a roll moment; leave it out"),
+        "objective.direction_weights: means nothing for roll moment; leave it out"),
     bad("gas without bore", "bore = \"100 mm\"\n", "",
         "engine.bore: is missing, but gas pressure acts on the piston; add it"),
     bad("unknown gas model", '"seiliger"', '"seliger"',
@@ -280,7 +280,7 @@ BAD = [
     bad("long number", "0.26", "9" * 5000,
         "file: contains a whole number of thousands of digits; shorten it"),
     bad("key given twice", "layout =", "cycle =",
-        "line 5, column 22: is no TOML: cycle is given twice, before in line 4; keep one of them"),
+        "line 5, column 22: is no TOML: cycle is given twice; keep one of them, or write [[ ]]"),
     bad("limit given twice", "[[constraints]]", (
         '[[constraints]]\nlimit = "balancer mass"\nmax = "5 kg"\n[[constraints]]'
         ), "constraints[2].max: limits 'balancer mass' once more, beside constraints[1] ('balancer mass')"),

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from laufruhe import load
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, Engine, OperatingPoint
-from laufruhe.machine.layouts import Layout, Mechanism, build, even_throws, inline, vee
+from laufruhe.machine.layouts import Layout, build, even_throws, inline, vee
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.studies.kinds.free_forces import FreeLoad, free_load
+from mechanisms import mechanism_of
 from one_cylinder import rotating_loads
 from problem_files import PROBLEMS
 
@@ -47,7 +48,7 @@ class Row:
     directions: int
 
     def engine(self, offset: float = 0.0) -> Engine:
-        mechanism = Mechanism(RADIUS, LENGTH, MASS, rod_rotating_mass=MASS, offset=offset)
+        mechanism = mechanism_of(RADIUS, LENGTH, MASS, rod_rotating_mass=MASS, offset=offset)
         cylinders, _ = build(self.cycle, self.layout, mechanism, self.throws, self.firing_order)
         return Engine(self.name, self.cycle, cylinders)
 

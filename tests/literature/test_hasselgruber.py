@@ -18,12 +18,13 @@ import pytest
 from numpy.typing import NDArray
 
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, Role, Rotor, Shaft
-from laufruhe.machine.layouts import Layout, Mechanism, boxer, build, inline, stations, vee
+from laufruhe.machine.layouts import Layout, boxer, build, inline, stations, vee
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import inertia_roll_orders, piston_acceleration_orders
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
 from laufruhe.studies.equal_power import equal_power_scale
+from mechanisms import mechanism_of
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 # Figs. 2, 5 and 12: s = 120 mm, m_osc = 1.25 kg, n = 2500 rpm, a = 125 mm; lambda is not printed
@@ -39,7 +40,7 @@ by_kinematics = pytest.mark.parametrize("fidelity", [TWO_ORDER, EXACT], ids=lamb
 def _engine(
     layout: Layout, throws: tuple[float, ...], *rotors: Rotor, cycle: Cycle = Cycle.FOUR_STROKE, offset: float = 0.0
 ) -> Engine:
-    mechanism = Mechanism(RADIUS, RADIUS / RATIO, MASS, offset=offset)
+    mechanism = mechanism_of(RADIUS, RADIUS / RATIO, MASS, offset=offset)
     cylinders, _ = build(cycle, layout, mechanism, throws)
     return Engine(layout.name, cycle, cylinders, rotors)
 
@@ -348,16 +349,16 @@ class TestEqualPower:
         """Eq. 23 holds for inertia: with lengths, masses and speed scaled, an engine shakes with the scaled force."""
         scale = equal_power_scale(cylinders, self.reference)
         throws = (0.0, 0.7, 2.0)
-        mechanism = Mechanism(
+        mechanism = mechanism_of(
             RADIUS, RADIUS / RATIO, MASS, rod_rotating_mass=0.8, rod_inertia_deficit=-4.2e-4, offset=0.004
         )
-        small = Mechanism(
-            mechanism.crank_radius * scale.length,
-            mechanism.rod_length * scale.length,
-            mechanism.reciprocating_mass * scale.mass,
-            rod_rotating_mass=mechanism.rod_rotating_mass * scale.mass,
-            rod_inertia_deficit=mechanism.rod_inertia_deficit * scale.mass * scale.length**2,
-            offset=mechanism.offset * scale.length,
+        small = mechanism_of(
+            RADIUS * scale.length,
+            RADIUS / RATIO * scale.length,
+            MASS * scale.mass,
+            rod_rotating_mass=0.8 * scale.mass,
+            rod_inertia_deficit=-4.2e-4 * scale.mass * scale.length**2,
+            offset=0.004 * scale.length,
         )
         loads = []
         for part, size, speed in ((mechanism, 1.0, SPEED), (small, scale.length, SPEED * scale.speed)):

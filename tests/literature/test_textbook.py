@@ -16,10 +16,11 @@ from scipy.optimize import brentq
 from laufruhe.machine import Cycle, Engine, OperatingPoint, PressureTrace, Rod, SliderCrank
 from laufruhe.machine import kinematics as slider_crank
 from laufruhe.machine.gas import AMBIENT_PRESSURE
-from laufruhe.machine.layouts import Mechanism, build, even_throws, inline
+from laufruhe.machine.layouts import build, even_throws, inline
 from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import reciprocating_loads
+from mechanisms import mechanism_of
 from one_cylinder import rotating_loads
 
 TWO_ORDER = Fidelity(kinematics="two-order")
@@ -144,7 +145,7 @@ class TestFiveCylinders:
     @property
     def engine(self) -> Engine:
         layout = inline(5, self.spacing)
-        mechanism = Mechanism(self.radius, self.radius / self.ratio, 10.0, rod_rotating_mass=14.0)
+        mechanism = mechanism_of(self.radius, self.radius / self.ratio, 10.0, rod_rotating_mass=14.0)
         throws = even_throws(Cycle.FOUR_STROKE, layout, (1, 2, 4, 5, 3))
         cylinders, _ = build(Cycle.FOUR_STROKE, layout, mechanism, throws, (1, 2, 4, 5, 3))
         return Engine("five", Cycle.FOUR_STROKE, cylinders)

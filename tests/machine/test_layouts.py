@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
@@ -16,22 +17,31 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Role, Shaft
 from laufruhe.machine.layouts import (
     Layout,
-    Mechanism,
     Throw,
+    angles_in_order,
     boxer,
     build,
     even_throws,
     facing_pistons,
-    firing_angles,
     inline,
     stations,
     throw_rotors,
     vee,
 )
 from laufruhe.physics.shaking_loads import reciprocating_loads
+from mechanisms import mechanism_of
 
 FOUR, TWO = Cycle.FOUR_STROKE, Cycle.TWO_STROKE
-MECHANISM = Mechanism(0.06, 0.06 / 0.26, 1.25, rotating_mass=0.8, rod_rotating_mass=0.5, bore=0.1)
+
+
+def firing_angles(
+    cycle: Cycle, layout: Layout, throws: Sequence[float], order: Sequence[int], intervals: Sequence[float] = ()
+) -> tuple[float, ...]:
+    centres = [layout.dead_centre(throws, k) for k in range(len(layout.positions))]
+    return angles_in_order(cycle, centres, order, intervals)
+
+
+MECHANISM = mechanism_of(0.06, 0.06 / 0.26, 1.25, rotating_mass=0.8, rod_rotating_mass=0.5, bore=0.1)
 
 
 def degrees(angles: tuple[float, ...], whole: float = 360.0) -> list[float]:

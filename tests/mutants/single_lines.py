@@ -14,7 +14,7 @@ SOURCE = Path(__file__).resolve().parents[2] / "src"
 ROOMS = (
     "physics", "load_models", "prove", "solvers", "machine",
     "extensions/joint_mounts", "extensions/long_cranks", "extensions/mount_relaxation", "extensions/robust",
-    "extensions/run_ups", "extensions/sizes", "extensions/torsion",
+    "extensions/phase_leads", "extensions/run_ups", "extensions/sizes", "extensions/torsion",
 )  # fmt: skip
 """Folders of physics, search and proof."""
 TOLERANCE = 1e-3

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from laufruhe.machine import Cycle, Engine, OperatingPoint
-from laufruhe.machine.layouts import Mechanism, build, inline
+from laufruhe.machine.layouts import build, inline
 from laufruhe.physics.crank_stars import StarSpace, star_sums
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
+from mechanisms import mechanism_of
 
 RADIUS, LAMBDA, MASS, SPACING, SPEED = 0.06, 0.26, 1.25, 0.125, 200.0
 
@@ -30,7 +31,7 @@ def places(throws):
 @given(st.integers(2, 9).flatmap(lambda n: st.permutations(range(n))))
 def test_score_equals_the_exact_model(star):
     n = len(star)
-    mechanism = Mechanism(RADIUS, RADIUS / LAMBDA, MASS)
+    mechanism = mechanism_of(RADIUS, RADIUS / LAMBDA, MASS)
     parts, _ = build(Cycle.TWO_STROKE, inline(n, SPACING), mechanism, [math.tau * p / n for p in star])
     wrench = shaking_loads(Engine("star", Cycle.TWO_STROKE, parts), OperatingPoint("at", SPEED), Fidelity("two-order"))
     forces, couples = score_stars(np.array([star], dtype=np.uint8), n, places(n), (1, 2))

@@ -21,10 +21,11 @@ from laufruhe.machine.firing import (
     star_throws,
     successive_neighbours,
 )
-from laufruhe.machine.layouts import Mechanism, build, inline, vee
+from laufruhe.machine.layouts import build, inline, vee
+from mechanisms import mechanism_of
 
 FOUR, TWO = Cycle.FOUR_STROKE, Cycle.TWO_STROKE
-MECHANISM = Mechanism(0.05, 0.2, 1.0)
+MECHANISM = mechanism_of(0.05, 0.2, 1.0)
 RIGHT = math.pi / 2
 
 

@@ -508,12 +508,12 @@ class TestRefusals:
         ("angles", "pressures", "words"),
         [
             ([0.0, 1.0, 2.0], [1e5] * 2, ["3 angles", "2 pressures"]),
-            ([0.0, 1.0, 2.0], [1e5] * 3, ["3 points"]),
-            ([0.0, 1.0, 1.0, 2.0], [1e5] * 4, ["point 3", "57.2958 deg", "sort"]),
-            ([0.0, 2.0, 1.0, 3.0], [1e5] * 4, ["point 3"]),
-            ([0.0, math.nan, 1.0, 3.0], [1e5] * 4, ["point 2", "nan"]),
-            ([0.0, 1.0, 2.0, 3.0], [1e5, 1e5, -2e5, 1e5], ["point 3", "-2 bar", "absolute"]),
-            ([0.0, 1.0, 2.0, 3.0], [1e5, math.inf, 1e5, 1e5], ["point 2", "inf"]),
+            ([0.0, 1.0, 2.0], [1e5] * 3, ["3 angles"]),
+            ([0.0, 1.0, 1.0, 2.0], [1e5] * 4, ["rise", "sort"]),
+            ([0.0, 2.0, 1.0, 3.0], [1e5] * 4, ["rise"]),
+            ([0.0, math.nan, 1.0, 3.0], [1e5] * 4, ["finite"]),
+            ([0.0, 1.0, 2.0, 3.0], [1e5, 1e5, -2e5, 1e5], ["positive", "absolute"]),
+            ([0.0, 1.0, 2.0, 3.0], [1e5, math.inf, 1e5, 1e5], ["finite"]),
         ],
     )
     def test_points(self, angles: list[float], pressures: list[float], words: list[str]) -> None:

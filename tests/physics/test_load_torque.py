@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.load_models.phase_lead_model import PhaseLeadModel
-from laufruhe.machine import Engine, LoadTorque
+from laufruhe.machine import LoadTorque
 from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.geared_inertia import geared_factor
@@ -20,12 +19,10 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import split_loads
 from laufruhe.physics.torque import crank_torque, excess_torque, swing_of, torque_facts, torque_parts
 from laufruhe.physics.uneven_speed import crank_motion, moving_inertia
-from laufruhe.problem.channels import IRREGULARITY, STORED_WORK
-from laufruhe.problem.decision import Kind
+from laufruhe.problem.channels import STORED_WORK
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.boxes.lead_swing import LeadSwing
 from problem_files import PROBLEMS
 
 DEGREES = np.arange(0.0, 720.0, 1.0)
@@ -150,24 +147,3 @@ def test_columns_of_pistons_leave_the_load_to_the_rest() -> None:
     value = evaluate(problem, problem.design(x.tolist(), problem.unbalances))
     rows = model.at(1440).terms[0][1].value(x)
     assert rows == pytest.approx(value.value(problem.objective[0].measure), rel=1e-3)
-
-
-def test_leads_turn_the_engine_against_the_load() -> None:
-    """The load stays with the crankshaft, in sums of shafts (P13) and in bounds of the irregularity (P14)."""
-    problem = problem_of("two-machines-angle", 40.0)
-    model = PhaseLeadModel(replace(problem, objective=(Term(WORK),), limits=()))
-    measure = Measure(IRREGULARITY, NORMS["mean"])
-    swing = LeadSwing(problem, model, measure)
-    plain = replace(problem, engine=replace(problem.engine, load_torque=None))
-    for lead in (0.4, 2.0):
-        exact = evaluate(problem, at_lead(problem, lead))
-        bound = swing.minimum_over(np.array([lead]), np.zeros(1))
-        assert bound == pytest.approx(exact.value(measure), rel=1e-3)
-        rows = model.norm(WORK, np.array([lead]), 1440, False).norm
-        assert rows.value(np.zeros(len(rows.slope[0, 0]))) == pytest.approx(exact.value(WORK), rel=1e-3)
-    works = [evaluate(p, at_lead(p, 0.4)).value(WORK) for p in (problem, plain)]
-    assert abs(works[0] - works[1]) > 0.02 * works[1]
-
-
-def at_lead(problem: Problem, lead: float) -> Engine:
-    return problem.design([lead if d.kind is Kind.LEAD else 0.0 for d in problem.decisions])

@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 
 from laufruhe.machine import Cycle, Engine
-from laufruhe.machine.layouts import Mechanism, build, vee
+from laufruhe.machine.layouts import build, vee
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.decision import RotorDrive
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
+from mechanisms import mechanism_of
 from tractor import LAMBDA, MASS, RADIUS, SPACING, engine, free_unbalance, problem, shaft_rotor, web
 
 HALF = 0.5 * MASS * RADIUS
@@ -124,7 +125,7 @@ def test_half_balance_of_a_single() -> None:
 def test_ninety_degree_vee_needs_no_shaft() -> None:
     """Fig. 29: a counterweight alone removes the first order of a 90 degree V-twin."""
     cylinders, _ = build(
-        Cycle.FOUR_STROKE, vee(2, 1.0, math.pi / 2), Mechanism(RADIUS, RADIUS / LAMBDA, MASS), [math.pi / 4]
+        Cycle.FOUR_STROKE, vee(2, 1.0, math.pi / 2), mechanism_of(RADIUS, RADIUS / LAMBDA, MASS), [math.pi / 4]
     )
     machine = Engine("vee", Cycle.FOUR_STROKE, cylinders, (web("web", 0.0),))
     first = (Term(Measure(channels.SHAKING_FORCE, NORMS["maximum"], orders=(1.0,))),)

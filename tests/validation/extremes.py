@@ -16,7 +16,7 @@ import numpy as np
 
 import tractor
 from laufruhe.machine import Block, Cycle, Engine, Mount, OperatingPoint, PressureTrace
-from laufruhe.machine.layouts import Mechanism, boxer, build, inline, vee
+from laufruhe.machine.layouts import boxer, build, inline, vee
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting
@@ -27,6 +27,7 @@ from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.sets import Sector
 from laufruhe.solvers import solve
 from many_digits import acceleration_orders
+from mechanisms import mechanism_of
 from one_cylinder import gas_torque
 
 EPS = float(np.finfo(float).eps)
@@ -116,7 +117,7 @@ def _single_load(speed: float, mass: float) -> np.ndarray:
 
 def balanced_engines() -> Entry:
     six = tractor.engine([0, 120, 240, 240, 120, 0])
-    mechanism = Mechanism(0.04, 0.15, 0.5)
+    mechanism = mechanism_of(0.04, 0.15, 0.5)
     throws = [math.radians(t) for t in (0, 120, 240)] * 2
     flat, _ = build(Cycle.FOUR_STROKE, boxer(6, 0.1, 0.03), mechanism, throws)
     in_line, opposed = (
@@ -171,7 +172,7 @@ def cylinder_numbers() -> Entry:
     errors = []
     for count in range(1, 49):
         order = _even_order(count)
-        mechanism = Mechanism(0.04, 0.15, 0.5)
+        mechanism = mechanism_of(0.04, 0.15, 0.5)
         throws = [2.0 * math.tau * k / count for k in order]
         parts, _ = build(Cycle.FOUR_STROKE, inline(count, 0.1), mechanism, throws)
         load = reciprocating_loads(Engine("n", Cycle.FOUR_STROKE, parts), 300.0)
@@ -207,7 +208,7 @@ def _star(throws: Sequence[float], harmonic: int) -> complex:
 
 
 def vee_angles() -> Entry:
-    mechanism = Mechanism(0.04, 0.15, 0.5)
+    mechanism = mechanism_of(0.04, 0.15, 0.5)
     throws = [math.radians(t) for t in (0, 90, 270, 180)]
     double = replace(mechanism, reciprocating_mass=1.0)
     closed, row, flat = (
@@ -234,7 +235,7 @@ def vee_angles() -> Entry:
 def intervals_equal_to_rounding() -> Entry:
     left = []
     for shift in (1e-16, -2e-16, 4e-16):
-        mechanism = Mechanism(0.04, 0.15, 0.5)
+        mechanism = mechanism_of(0.04, 0.15, 0.5)
         throws = [0.0, math.tau / 3 + shift, 2 * math.tau / 3 - shift]
         parts, _ = build(Cycle.TWO_STROKE, inline(3, 0.1), mechanism, throws)
         left.append(float(np.abs(reciprocating_loads(Engine("t", Cycle.TWO_STROKE, parts), 300.0).at(1)[1:3]).max()))

@@ -48,12 +48,8 @@ def expand_bearings(tables: Sequence[MainBearingTable], throws: Sequence[Throw])
             raise Refused(f"{where}.name", table.name, "would be the name of several bearings", "leave it out")
         for key in ("diameter", "width"):
             if isinstance(getattr(table, key), Open):
-                raise Refused(
-                    f"{where}.{key}",
-                    None,
-                    "is open, but stands for several bearings",
-                    "list the bearings one by one, each with its x",
-                )
+                rule = "is open, but stands for several bearings"
+                raise Refused(f"{where}.{key}", None, rule, "list the bearings one by one, each with its x")
         pins = sorted({throw.x for throw in throws if throw.shaft.name == table.shaft}, reverse=True)
         if not pins:
             raise Refused(f"{where}.shaft", table.shaft, "has no throws", "name a shaft with cranks")
@@ -84,11 +80,8 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
                 raise Refused(f"{where}.name", name, "is already the name of another bearing", "give each its own name")
             reach = 0.5 * ((bearing.width or 0.0) + (placed.width or 0.0))
             if bearing.shaft == placed.shaft and abs(bearing.x - placed.x) <= reach:
-                rule, remedy = (
-                    f"lets its journal overlap that of bearing {placed.name}",
-                    "move one of them, or make it narrower",
-                )
-                raise Refused(f"{where}.x", units.quantity_text(bearing.x, "m"), rule, remedy)
+                text, remedy = units.quantity_text(bearing.x, "m"), "move one of them, or make it narrower"
+                raise Refused(f"{where}.x", text, f"lets its journal overlap that of bearing {placed.name}", remedy)
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):
             rule = "is the place of a crank pin"
             raise Refused(f"{where}.x", units.quantity_text(bearing.x, "m"), rule, "move it beside the throw")
@@ -107,7 +100,6 @@ def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[Slid
     is_axle = len(bearings) == len(places) == 2 and places[0] < first and last < places[1]
     for part in parts if len(places) > 1 and not is_axle else ():
         if not first < part.x < last:
-            rule = (
-                f"leaves the throw of {part.name} at x = {units.quantity_text(part.x, 'm')} on one side of all bearings"
-            )
+            place = units.quantity_text(part.x, "m")
+            rule = f"leaves the throw of {part.name} at x = {place} on one side of all bearings"
             raise Refused("main_bearings", None, rule, "put a bearing on its other side")

@@ -72,7 +72,8 @@ def draft_of_engine(name: str) -> str:
         "# What it takes from there; without its #, a line takes the place of the catalogue's.", *published,
         "# Assumed, for no source gives them; the report says so until you put your own:", *assumed, "",
     ])  # fmt: skip
-    return _draft(entry.name, table, engine_of_table(entry.name, entry.engine, Path(name)))
+    tables = {"title": entry.name, "engine": dict(entry.engine), "operating_points": [{"speed": SPEED}]}
+    return _draft(entry.name, table, load_tables(tables, Path(name)).engine)
 
 
 def draft_of_tables(tables: Mapping[str, Any], path: Path) -> str:
@@ -82,12 +83,6 @@ def draft_of_tables(tables: Mapping[str, Any], path: Path) -> str:
     gas = toml_text({"gas": tables["gas"]}) if "gas" in tables else _GAS
     engine = load_tables(tables, path).engine
     return _draft(tables["title"], f"{toml_text(head)}", engine, point["speed"], gas)
-
-
-def engine_of_table(title: str, engine: Mapping[str, Any], path: Path) -> Engine:
-    """Return the engine of an [engine] table; raise `InputError` for the file if the engine cannot exist."""
-    tables = {"title": title, "engine": dict(engine), "operating_points": [{"speed": SPEED}]}
-    return load_tables(tables, path).engine
 
 
 def _draft(title: str, engine: str, built_engine: Engine, speed: str = SPEED, gas: str = _GAS) -> str:

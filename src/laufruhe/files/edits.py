@@ -9,8 +9,8 @@ from typing import Any, TypeAlias
 
 from laufruhe import units
 from laufruhe.files.complaints import Refused, nearest, read_number
-from laufruhe.files.fields import Number
-from laufruhe.files.nested import at, with_value_at
+from laufruhe.files.fields import Number, Open
+from laufruhe.files.nested import at, number_at, with_value_at
 from laufruhe.files.problem_file import EXTENSION_KEYS, file_model
 from laufruhe.files.python_numbers import SIZES, sized, written
 from laufruhe.files.rotors import name_of_unbalance
@@ -21,7 +21,6 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 _SIZES = ("mass", "unbalance", "balance_factor")
 _ANGLE = Number("rad", plain=math.radians(1.0))
 _ACROSS = {"y": 0, "z": 1}
-_NUMBER = re.compile(r"\s*-\s*(?=[\d.])")
 _THROW, _BUILT = re.compile(r"throw (\d{1,3})"), " built"
 
 
@@ -50,23 +49,23 @@ def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, An
     keys = keys_by_name(tables, name)
     if isinstance(value, complex) and keys[-1] in SIZES:
         return _with_vector(tables, keys, value)
-    now, value = at(tables, keys), written(value, keys, tables)
-    return with_value_at(tables, keys, {**now, "start": value} if _is_open(now) else value)
+    return _with_start(tables, keys, value)
+
+
+def _with_start(tables: Mapping[str, Any], keys: Keys, value: Any) -> dict[str, Any]:
+    now, new = at(tables, keys), written(value, keys, tables)
+    return with_value_at(tables, keys, {**now, "start": new} if _is_open(now) else new)
 
 
 def _with_vector(tables: Mapping[str, Any], keys: Keys, value: complex) -> dict[str, Any]:
-    """Return tables with size and angle of a weight; `keys` are the address of the size."""
-    size, now = at(tables, keys), at(tables, (*keys[:-1], "angle"))
+    # tables with size and angle of a weight; `keys` are the address of the size
+    now = at(tables, (*keys[:-1], "angle"))
     parts = sized(keys[-1], value, None, keys[:-1])
     if _is_open(now):
         low = read_number(_ANGLE, (*keys[:-1], "angle"), now["between"][0])
         assert isinstance(low, float)
         parts["angle"] = low + (parts["angle"] - low) % math.tau
-    for key, old in ((keys[-1], size), ("angle", now)):
-        place = (*keys[:-1], key)
-        new = written(parts[key], place, tables)
-        tables = with_value_at(tables, place, {**old, "start": new} if _is_open(old) else new)
-    return dict(tables)
+    return _with_start(_with_start(tables, keys, parts[keys[-1]]), (*keys[:-1], "angle"), parts["angle"])
 
 
 def with_goal(tables: Mapping[str, Any], key: str, goal: Mapping[str, Any], adds: bool) -> dict[str, Any]:
@@ -102,7 +101,7 @@ def fix_number(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[
     if value is None:
         if not _is_open(now):
             raise Refused(name, now, "is not open", "give a value for it")
-        new = now.get("start", _default_start(*now["between"]))
+        new = now["start"] if "start" in now else written(number(tables, name)[0], keys, tables)
     else:
         new = written(value, keys, tables)
     edited = with_value_at(tables, keys, new)
@@ -127,18 +126,13 @@ def with_star(tables: Mapping[str, Any], star: Mapping[str, Any], gone: Collecti
     return edited
 
 
-def _default_start(low: Any, high: Any) -> Any:
-    # the default is zero, or the bound nearest to it
-    if not _is_negative(low):
-        return low
-    if _is_negative(high):
-        return high
-    unit = units.unit_of(low) if isinstance(low, str) else ""
-    return f"0 {unit}".rstrip() if isinstance(low, str) else 0
-
-
-def _is_negative(value: Any) -> bool:
-    return _NUMBER.match(value) is not None if isinstance(value, str) else value < 0
+def number(tables: Mapping[str, Any], name: str) -> tuple[float, str]:
+    """Return value or start of a number [SI], by its name in results or its path, and its unit."""
+    keys = keys_by_name(tables, name)
+    value, field = at(tables, keys), number_at(file_model(), keys)
+    if field is None or value is None:
+        raise Refused(name, value, "is no number of this problem", "name a number of the problem file")
+    return Open.from_value(read_number(field, keys, value)).start, field.unit
 
 
 def unit_of_bounds(tables: Mapping[str, Any], name: str) -> str:

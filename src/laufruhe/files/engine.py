@@ -370,9 +370,9 @@ def _single_inputs(table: EngineTable, count: int, gas: bool) -> dict[int, Layou
             )
             with errors_at_key(where):
                 values = _layout_input(one, gas)
-                offset = keys.get("offset", values.mechanism.offset)
-                mechanism = replace(values.mechanism, offset=offset, pin_mass=keys.get("rotating_mass"))
-                mechanism.cylinder(number, 0.0, 0.0, 0.0, 0.0)
+                part = values.mechanism.part
+                part = replace(part, name=f"{part.noun} {number}", offset=keys.get("offset", part.offset))
+                mechanism = replace(values.mechanism, part=part, pin_mass=keys.get("rotating_mass"))
             inputs[number - 1] = replace(values, mechanism=mechanism)
     return inputs
 
@@ -445,18 +445,13 @@ def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> t
             raise Refused(
                 "engine.rod_inertia_deficit", None, "is given here and also follows from [engine.rod]", "keep one"
             )
-    plain = Mechanism(
-        crank_radius=radius,
-        rod_length=rod_length,
-        reciprocating_mass=table.piston_mass + (rod.reciprocating_mass if rod else 0.0),
-        rotating_mass=table.rotating_mass,
-        rod_rotating_mass=rod.rotating_mass if rod else 0.0,
-        rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
-        offset=table.offset,
-        bore=table.bore,
-        big_end=big_end,
-    )
-    return DRIVES[table.drive].mechanism(plain, _sizes(table)), rod
+    drive = DRIVES[table.drive]
+    part = SliderCrank(
+        "cylinder 1", 0.0, radius, rod_length, table.piston_mass + (rod.reciprocating_mass if rod else 0.0),
+        offset=table.offset if drive.has_rod else 0.0, rotating_mass=rod.rotating_mass if rod else 0.0,
+        rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit, bore=table.bore, big_end=big_end,
+    )  # fmt: skip
+    return Mechanism(drive.mechanism(part, _sizes(table)), table.rotating_mass), rod
 
 
 def _sizes(table: EngineTable) -> Sizes:
@@ -503,12 +498,8 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
     for k, part in enumerate(table.slider_cranks, 1):
         where = f"engine.slider_cranks[{k}]"
         if part.shaft not in shafts:
-            raise Refused(
-                f"{where}.shaft",
-                part.shaft,
-                "is not the name of a shaft of this engine",
-                nearest(part.shaft, list(shafts)),
-            )
+            rule = "is not the name of a shaft of this engine"
+            raise Refused(f"{where}.shaft", part.shaft, rule, nearest(part.shaft, list(shafts)))
         overrides = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
         if part.rod_ratio is not None or part.rod_length is not None:
             overrides |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}

@@ -191,7 +191,9 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
     air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
     with errors_at_key("gas"):
         if isinstance(table, ChambersTable):
-            _require_chambers(cycle)
+            if cycle is not Cycle.TWO_STROKE:
+                rule = "does not suit gas chambers, which work once a turn"
+                raise Refused("engine.cycle", str(cycle), rule, 'write "two-stroke"')
             return Chambers(_chambers(table.chambers, folder, parts, air), air)
         single = _single_chambers(table, folder, parts, air)
         common: CommonGas
@@ -303,12 +305,6 @@ def _angle_zero(table: TraceTable, cycle: Cycle) -> str | float | None:
     return si_value(f"{zero} deg" if isinstance(zero, float | int) else zero, "rad", key)
 
 
-def _require_chambers(cycle: Cycle) -> None:
-    if cycle is not Cycle.TWO_STROKE:
-        rule = "does not suit gas chambers, which work once a turn"
-        raise Refused("engine.cycle", str(cycle), rule, 'write "two-stroke"')
-
-
 def _chambers(
     tables: Sequence[ChamberTable], folder: Path, parts: Sequence[SliderCrank], air: float
 ) -> tuple[Chamber, ...]:
@@ -337,16 +333,12 @@ def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCr
         raise Refused(where, None, rule, f"give the chamber one of the keys {', '.join(keys[:-1])} and {keys[-1]}")
     ((key, diagram),) = diagrams.items()
     numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
-    for number in numbers:
-        if number > len(parts):
-            rule = f"is not among {counted(len(parts), 'cylinder')}"
-            raise Refused(f"{where}.cylinders", str(number), rule, "count them from 1")
+    names = tuple(names_of_cylinders(numbers, parts, f"{where}.cylinders"))
     with errors_at_key(f"{where}.{key}"):
         model = (
             recorded_trace(diagram, folder, f"{where}.trace", Cycle.TWO_STROKE, 1.0, air, 0.0)
             if key == "trace"
             else diagram.makes(**diagram.model_dump())
         )
-    names = tuple(parts[number - 1].name for number in numbers)
     with errors_at_key(f"{where}.rod"):
         return Chamber(table.name or f"chamber {k}", names, table.end, table.bore, table.rod, model)

@@ -178,8 +178,7 @@ class MeasureContext:
             if value == []:
                 raise Refused(f"{where}.{key}", [], "is empty", "remove this key to count all")
             if value is not None and key not in channel.keys:
-                wrong_value = value if key == "of" else None
-                raise Refused(f"{where}.{key}", wrong_value, _why_stray(key, channel), "leave it out")
+                raise Refused(f"{where}.{key}", None, f"means nothing for {channel}", "leave it out")
         points, cases = ([named.name for named in listed] for listed in (self.points, self.engine.load_cases))
         _check_known(table.operating_points, points, f"{where}.operating_points", "operating point")
         _check_known(table.load_cases, cases, f"{where}.load_cases", "load case")
@@ -209,33 +208,14 @@ class MeasureContext:
         _check_known(of, [rotor.name for rotor in rotors], f"{where}.of", "counterweight or balancer")
         counted = counted_rotors(measure, rotors)
         if not counted and not counterweight_masses(measure, self.engine.slider_cranks):
-            raise Refused(
-                where,
-                measure.name,
-                "counts the mass of no part of this engine",
-                "add a counterweight or balancer shaft to the engine, or remove this measure",
-            )
+            remedy = "add a counterweight or balancer shaft to the engine, or remove this measure"
+            raise Refused(where, measure.name, "counts the mass of no part of this engine", remedy)
         for rotor in counted:
             try:
                 radius_of(rotor)
             except ModelError:
                 rule = f"counts the mass of '{rotor.name}', which has no radius"
                 raise Refused(where, measure.name, rule, "give it a radius") from None
-
-
-def _why_stray(key: str, channel: Channel) -> str:
-    """Return the reason why a key does not apply to a quantity (channel), as the end of a sentence."""
-    if key == "of":
-        return "is for masses and places of shafts only"
-    if channel.is_mass:
-        return "means nothing for a mass"
-    if channel.is_load and key == "alternating":
-        return f"means nothing for {channel}, which includes the steady load"
-    if channel.is_load and key in PLACES:
-        return f"means nothing for a {channel}, which has no {PLACES[key]} of its own"
-    if channel.is_load and key == "direction_weights":
-        return f"is for forces and travels at places, not for a {channel}"
-    return f"means nothing for {channel}" if channel.is_mounting else f"means nothing for a {channel}"
 
 
 def _check_known(names: list[str] | None, allowed: Sequence[str], where: str, kind: str) -> None:
@@ -360,11 +340,8 @@ def _check_unique(limits: Sequence[Limit]) -> None:
             previous = first.setdefault((limit.measure, limit.name, side, band), k)
             if previous != k:
                 other = f"constraints[{previous + 1}] ('{limits[previous].name}')"
-                rule, remedy = (
-                    f"limits '{limit.name}' once more, beside {other}",
-                    "keep the tighter one, or give each a name",
-                )
-                raise Refused(f"constraints[{k + 1}].{side}", None, rule, remedy)
+                rule = f"limits '{limit.name}' once more, beside {other}"
+                raise Refused(f"constraints[{k + 1}].{side}", None, rule, "keep the tighter one, or name each")
 
 
 def limit_name(entry: Mapping[str, Any]) -> str | None:

@@ -226,12 +226,9 @@ def _rigid(table: MountsTable, axes: Axes) -> tuple[Mount, ...]:
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
             prefix = f"places[{k}]." if place.relative_stiffness else ""
-            raise Refused(
-                f"mounts.{prefix}relative_stiffness",
-                stiffness,
-                "is a stiffness of zero in every direction",
-                "give at least one direction a value above zero, such as 1",
-            )
+            rule = "is a stiffness of zero in every direction"
+            remedy = "give at least one direction a value above zero, such as 1"
+            raise Refused(f"mounts.{prefix}relative_stiffness", stiffness, rule, remedy)
         position, turned = (
             [Open.from_value(value).start for value in _values(table, place, key, where, "add it, or mirror_of")]
             for key in ("position", "turned")
@@ -388,11 +385,8 @@ class _Numbers:
         elif key == "turned":
             is_fixed = not any(value.is_open for value in numbers_of_file)
             if not is_fixed and not axes.are_own:
-                rule, remedy = (
-                    "may not be open in axes of a vehicle",
-                    "remove mounts.axes, and give the engine's own axes",
-                )
-                raise Refused(f"{where}.{key}", None, rule, remedy)
+                remedy = "remove mounts.axes, and give the engine's own axes"
+                raise Refused(f"{where}.{key}", None, "may not be open in axes of a vehicle", remedy)
             starts = axes.turned(starts) if is_fixed and not axes.are_own else starts
         for number, start in zip(numbers, starts, strict=True):
             self.rows[-1][number] = start
@@ -433,19 +427,11 @@ def load_cases_of(tables: Sequence[LoadCaseTable], block: Block | None) -> tuple
     cases = []
     for k, table in enumerate(tables, 1):
         if not any((*(table.times_weight or ()), table.torque, *(table.force or ()))):
-            raise Refused(
-                f"load_cases[{k}]",
-                table.name,
-                "has no load",
-                "give the load case one of times_weight, torque and force",
-            )
+            remedy = "give the load case one of times_weight, torque and force"
+            raise Refused(f"load_cases[{k}]", table.name, "has no load", remedy)
         if table.place is not None and table.force is None:
-            raise Refused(
-                f"load_cases[{k}].place",
-                table.place,
-                "has no force",
-                "give the load case a force, or remove its position",
-            )
+            remedy = "give the load case a force, or remove its position"
+            raise Refused(f"load_cases[{k}].place", table.place, "has no force", remedy)
         weight, force, place = (
             (three[0], three[1], three[2]) if three else (0.0, 0.0, 0.0)
             for three in (table.times_weight, table.force, table.place)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Protocol, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
@@ -21,15 +20,8 @@ USUAL = {"numbering": BY_BANK, "first_bank": "left", "first_end": "front"}
 REVERSED = "counter-clockwise"
 
 
-class Numbered(Protocol):
-    """Table [engine] with the keys in `KEYS`."""
-
-    def value_of(self, key: str) -> Any:
-        """Return the value of a key."""
-
-
-def place_order(table: Numbered, kind: LayoutKind, count: int) -> tuple[int, ...]:
-    """Return the index of the place of each cylinder by its number.
+def place_order(table: Any, kind: LayoutKind, count: int) -> tuple[int, ...]:
+    """Return the index of the place of each cylinder by its number; `table` is [engine].
 
     The layout counts places bank by bank from the front, and the left bank is its first. If the crank turns the other
     way, the layout is the mirror image of the engine, and its first bank is the right one.
@@ -44,7 +36,12 @@ def place_order(table: Numbered, kind: LayoutKind, count: int) -> tuple[int, ...
         raise Refused("engine.numbering", scheme, rule, "leave it out, or list the number of each cylinder")
     per_bank, is_mirrored = count // banks, int(rotation == REVERSED and banks > 1)
     if isinstance(scheme, list):
-        _check(scheme, count, first_bank, first_end)
+        if sorted(scheme) != list(range(1, count + 1)):
+            raise Refused("engine.numbering", scheme, f"is no permutation of 1 to {count}", "number every cylinder")
+        if first_bank is not None or first_end is not None:
+            key = "first_end" if first_bank is None else "first_bank"
+            rule = "means nothing beside a list of numbers, which gives every place"
+            raise Refused(f"engine.{key}", table.value_of(key), rule, "leave it out")
         seen = [(k // per_bank ^ is_mirrored) * per_bank + k % per_bank for k in range(count)]
         return tuple(seen[scheme.index(number)] for number in range(1, count + 1))
     swap = is_mirrored ^ int(first_bank == "right")
@@ -57,19 +54,10 @@ def place_order(table: Numbered, kind: LayoutKind, count: int) -> tuple[int, ...
     return tuple(sorted(range(count), key=turn))
 
 
-def sense_of(table: Numbered) -> tuple[str, ...]:
+def sense_of(table: Any) -> tuple[str, ...]:
     """Return the sentence of a report about an engine that turns counter-clockwise; empty for others."""
     text = (
         "The crank turns counter-clockwise seen from the front: angles count in its sense, y points to the right, and "
         "pictures show the mirror image."
     )
     return (text,) if table.value_of("rotation") == REVERSED else ()
-
-
-def _check(numbers: Sequence[int], count: int, first_bank: str | None, first_end: str | None) -> None:
-    if sorted(numbers) != list(range(1, count + 1)):
-        raise Refused("engine.numbering", list(numbers), f"is no permutation of 1 to {count}", "number every cylinder")
-    for key, value in (("first_bank", first_bank), ("first_end", first_end)):
-        if value is not None:
-            rule = "means nothing beside a list of numbers, which gives every place"
-            raise Refused(f"engine.{key}", value, rule, "leave it out")

@@ -108,8 +108,8 @@ class Brake:
             rule = f"is less than its uncertainty, {units.quantity_text(friction.deviation, 'Pa')} times deviations"
             remedy = "measure more points, or lower friction.deviations"
             raise Refused("friction", units.quantity_text(friction.mean, "Pa"), rule, remedy)
-        bars = (f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation))
-        lowest, middle, maximum, loss, deviation = bars
+        numbers = (*pressures, friction.mean, friction.deviation)
+        lowest, middle, maximum, loss, deviation = (f"{1e-5 * p:.4g}" for p in numbers)
         self.said.append(
             f"Indicated mean pressure at {where} {middle} bar, {lowest} to {maximum} bar: {1e-5 * brake:.4g} bar at "
             f"the brake and {loss} bar of friction, {self.table.deviations:g} deviations of {deviation} bar to either "
@@ -192,12 +192,8 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
     """Return the speeds of a table [rad/s]: one, or equal steps over a range."""
     require_one_of(table, where, "speed", "mean_piston_speed")
     if table.speed is None and stroke is None:
-        raise Refused(
-            f"{where}.mean_piston_speed",
-            None,
-            "is a mean piston speed, and this engine has no pistons",
-            "give the speed",
-        )
+        rule = "is a mean piston speed, and this engine has no pistons"
+        raise Refused(f"{where}.mean_piston_speed", None, rule, "give the speed")
     # c_m = 2 s n (Roetscher eq. 290)
     first = math.pi * (table.mean_piston_speed or 0.0) / (stroke or 1.0) if table.speed is None else table.speed
     if table.up_to is None and table.steps is None:

@@ -47,7 +47,11 @@ def written(value: Any, place: Place, tables: Mapping[str, Any]) -> Any:
     number = number_at(file_model(), place)
     if number is not None and number.plain is not None:
         return _angle(value, number, place)
-    unit = number.unit if number is not None else _unit_of_limit(place, tables)
+    unit = "" if number is None else number.unit
+    if number is None and place[0] == "constraints" and len(place) > 2 and place[2] in EDGES:
+        # the edges of a limit have the unit of its quantity
+        quantity = at(tables, place[:2]).get("limit")
+        unit = Measure(*MEASURES[quantity]).unit if quantity in MEASURES else ""
     return f"{value!r} {unit}" if unit else value
 
 
@@ -70,11 +74,3 @@ def _angle(value: float, number: Number, place: Place) -> float | str:
     degrees = round(math.degrees(value), 9)
     degrees = int(degrees) if degrees.is_integer() else degrees
     return degrees if degrees * (number.plain or 1.0) == value else f"{value!r} rad"
-
-
-def _unit_of_limit(place: Place, tables: Mapping[str, Any]) -> str:
-    # the edges of a limit have the unit of its quantity
-    if place[0] != "constraints" or len(place) < 3 or place[2] not in EDGES:
-        return ""
-    quantity = at(tables, place[:2]).get("limit")
-    return Measure(*MEASURES[quantity]).unit if quantity in MEASURES else ""

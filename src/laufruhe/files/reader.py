@@ -28,18 +28,17 @@ from laufruhe.files.complaints import (
     errors_in_file,
     key_path,
     nearest_file,
-    read_number,
 )
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import with_fidelity
-from laufruhe.files.fields import Open, check_format
+from laufruhe.files.fields import check_format
 from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
 from laufruhe.files.load_torque import load_torque_of
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import axes_sentences, load_cases_of, mounts_of
-from laufruhe.files.nested import at, example_at, number_at, plain, walk, with_value_at
+from laufruhe.files.nested import at, example_at, plain, walk, with_value_at
 from laufruhe.files.numbering import REVERSED, sense_of
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, open_phasing
@@ -179,8 +178,15 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     if file.geared_inertias and file.engine.throws is not None and file.engine.listed_throws is None:
         rule = "need fixed throws, but engine.throws is open"
         raise Refused("geared_inertias", None, rule, "fix the throws, or remove [[geared_inertias]]")
-    if file.engine.gravity:
-        _check_gravity(file)
+    # what is not modelled together with the weight of moving parts (T14)
+    reasons = {
+        "an open crank": file.phasing is not None or is_open(file.engine, file.balancer_shafts),
+        "[[geared_inertias]]": bool(file.geared_inertias),
+        "fidelity.crank_inertia": file.fidelity.value_of("crank_inertia") is not None,
+    }
+    if file.engine.gravity and any(reasons.values()):
+        what = next(what for what, is_present in reasons.items() if is_present)
+        raise Refused("engine.gravity", True, f"is not modelled together with {what}", "leave one of the two out")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
     if isinstance(file.gas, TraceTable) and file.gas.cylinder_angles == "common":
@@ -188,18 +194,6 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
         raise Refused("gas.cylinder_angles", "common", rule, "count each column from the firing of its cylinder")
     closed = partial(_assembled, file, path=path)
     return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
-
-
-def _check_gravity(file: ProblemFile) -> None:
-    # what is not modelled together with the weight of moving parts (T14)
-    reasons = {
-        "an open crank": file.phasing is not None or is_open(file.engine, file.balancer_shafts),
-        "[[geared_inertias]]": bool(file.geared_inertias),
-        "fidelity.crank_inertia": file.fidelity.value_of("crank_inertia") is not None,
-    }
-    for what, is_present in reasons.items():
-        if is_present:
-            raise Refused("engine.gravity", True, f"is not modelled together with {what}", "leave one of the two out")
 
 
 class FileOrigin(Origin):
@@ -214,11 +208,7 @@ class FileOrigin(Origin):
     def number(self, name: str) -> tuple[float, str]:
         """Return value or start of a number [SI], by its name in results or its path, and its unit."""
         with errors_in_file(self.path):
-            place = edits.keys_by_name(self.tables, name)
-            value, field = at(self.tables, place), number_at(file_model(), place)
-            if field is None or value is None:
-                raise Refused(name, value, "is no number of this problem", "name a number of the problem file")
-            return Open.from_value(read_number(field, place, value)).start, field.unit
+            return edits.number(self.tables, name)
 
     def to_toml(self) -> str:
         """Return the text of the problem file."""

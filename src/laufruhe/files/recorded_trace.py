@@ -306,11 +306,21 @@ def recorded_trace(
     file = RecordedFile(table, folder, where)
     period = cycle.angle / pace
     angles, pressures = smooth_values(file, file.angles(), _absolute(file, table, air), cycle, pace)
-    _require_exchange(file, angles, pressures, cycle, period)
+    # one turn of a four-stroke has the burn, the other one the gas exchange
+    other = np.interp(angles + 0.5 * period, angles, pressures, period=period)
+    if cycle is Cycle.FOUR_STROKE and _correlation(pressures, other) > _ALIKE:
+        rule = "has the same pressures in both turns of its four-stroke cycle"
+        raise file.refused(rule, "check engine.cycle, or record the gas exchange too")
     exchange = 0.5 * period if cycle is Cycle.FOUR_STROKE else 0.0
     angles = angles - later
     start = _zero(file, angles, pressures, zero, exchange, period)
-    angles, pressures = _within_cycle(angles + start, pressures, period) if later else (angles + start, pressures)
+    angles = angles + start
+    if later:
+        # the end of a cycle may repeat the beginning
+        last = len(angles) - int(angles[-1] - angles[0] > period * (1.0 - 1e-9))
+        angles = np.mod(angles[:last] + 0.5 * period, period) - 0.5 * period
+        order = np.argsort(angles)
+        angles, pressures = angles[order], pressures[:last][order]
     if table.peg is not None:
         since = np.mod(angles - table.peg.at + math.pi, period) - math.pi
         rise = table.peg.to - float(np.mean(pressures[np.abs(since) <= max(_PEG_WIDTH, float(np.abs(since).min()))]))
@@ -323,14 +333,6 @@ def recorded_trace(
         raise file.refused(rule, 'write gauge = true, or peg = { at = "-180 deg", to = "1 bar" } with what is known')
     with errors_at_key(f"{where}.file", table.file):
         return PressureTrace(tuple(angles.tolist()), tuple(pressures.tolist()), air, tuple(file.said))
-
-
-def _within_cycle(angles: Array, pressures: Array, period: float) -> tuple[Array, Array]:
-    # the end of a cycle may repeat the beginning
-    last = len(angles) - int(angles[-1] - angles[0] > period * (1.0 - 1e-9))
-    wrapped = np.mod(angles[:last] + 0.5 * period, period) - 0.5 * period
-    order = np.argsort(wrapped)
-    return wrapped[order], pressures[:last][order]
 
 
 def _finite(values: Array) -> Array:
@@ -391,19 +393,15 @@ def _cycles(file: RecordedFile, angles: Array, pressures: Array, period: float) 
     # the last point of the file may be the end of a whole cycle
     partial = np.count_nonzero((counts > 1) & (counts < _WHOLE * counts.max()))
     file.said += [f"Cycles that are not whole and not used: {partial}."] if partial else []
-    cycles = []
+    grid, cycles = np.zeros(0), list[Array]()
     for k in whole:
         local, values = angles[index == k] - k * period, pressures[index == k]
         # the end of a cycle may repeat the beginning of the next
         new = np.concatenate([[True], np.diff(local) > 1e-3 * step])
-        cycles.append((local[new], values[new]))
-    grid = cycles[0][0]
-    matrix = [
-        column if len(local) == len(grid) and np.abs(local - grid).max() < 1e-3 * step
-        else np.interp(grid, local, column, period=period)
-        for local, values in cycles for column in values.T
-    ]  # fmt: skip
-    return grid, np.array(matrix)
+        local, values, grid = local[new], values[new], grid if len(grid) else local[new]
+        is_same = len(local) == len(grid) and np.abs(local - grid).max() < 1e-3 * step
+        cycles += [column if is_same else np.interp(grid, local, column, period=period) for column in values.T]
+    return grid, np.array(cycles)
 
 
 def _chosen(file: RecordedFile, cycles: Array) -> Array:
@@ -428,14 +426,6 @@ def _chosen(file: RecordedFile, cycles: Array) -> Array:
     k = int(peaks.argmax()) if choice == "worst" else int(choice) - 1
     file.said.append(f"{which}, number {k + 1} is used.")
     return np.asarray(cycles[k])
-
-
-def _require_exchange(file: RecordedFile, angles: Array, pressures: Array, cycle: Cycle, period: float) -> None:
-    # one turn of a four-stroke has the burn, the other one the gas exchange
-    other = np.interp(angles + 0.5 * period, angles, pressures, period=period)
-    if cycle is Cycle.FOUR_STROKE and _correlation(pressures, other) > _ALIKE:
-        rule = "has the same pressures in both turns of its four-stroke cycle"
-        raise file.refused(rule, "check engine.cycle, or record the gas exchange too")
 
 
 def _zero(

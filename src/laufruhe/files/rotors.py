@@ -124,27 +124,21 @@ def counterweights(
     tables: Sequence[CounterweightTable], cylinders: Sequence[SliderCrank], throws: Sequence[Throw], into: RotorList
 ) -> None:
     """Add the counterweights of a file to a list of rotors: opposite each throw, or single ones."""
-    pins = []
-    for throw in throws:
-        parts = [cylinders[k] for k in throw.cylinders]
-        rods = sum(part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)) for part in parts)
-        reciprocating = sum(part.reciprocating_mass * part.crank_radius for part in parts)
-        pins.append(_Pin(throw.x, throw.angle, rods + throw.unbalance, reciprocating, throw.shaft))
     for k, table in enumerate(tables, 1):
         where = f"counterweights[{k}]"
-        pins_of_shaft = [pin for pin in pins if pin.shaft.name == table.shaft]
+        on_shaft = [throw for throw in throws if throw.shaft.name == table.shaft]
         if table.shaft == EVERY and table.factor_key is not None:
-            pins_of_shaft = pins
-        elif not pins_of_shaft and table.shaft != CRANKSHAFT.name:
-            names = list(dict.fromkeys(pin.shaft.name for pin in pins))
+            on_shaft = list(throws)
+        elif not on_shaft and table.shaft != CRANKSHAFT.name:
+            names = list(dict.fromkeys(throw.shaft.name for throw in throws))
             raise Refused(f"{where}.shaft", table.shaft, "is no shaft with throws", nearest(table.shaft, names))
         if table.factor_key is not None:
             if not all(part.is_balanced_by_share for part in cylinders):
                 rule = "needs pistons on crank pins, and the ram of a swinging yoke moves differently"
                 raise Refused(f"{where}.{table.factor_key}", None, rule, "give an unbalance or a mass")
-            _opposite_throws(table, pins_of_shaft, where, into)
+            _opposite_throws(table, cylinders, on_shaft, where, into)
         else:
-            _single_counterweight(table, pins_of_shaft, where, into)
+            _single_counterweight(table, on_shaft, where, into)
 
 
 def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:
@@ -155,50 +149,44 @@ def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:
             raise Refused(f"counterweights[{k}].{weight.factor_key}", None, rule, remedy)
 
 
-@dataclass(frozen=True)
-class _Pin:
-    """Throw with the unbalances that an opposite counterweight has to balance [kg m] (eq. 13)."""
-
-    x: float
-    angle: float
-    rotating: complex
-    reciprocating: float
-    shaft: Shaft
-
-
-def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
+def _opposite_throws(
+    table: CounterweightTable, cylinders: Sequence[SliderCrank], throws: Sequence[Throw], where: str, into: RotorList
+) -> None:
     key = table.factor_key or FACTORS[0]
     excluded = [name for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key]
     refuse_keys(table, excluded, where, f"cannot stand beside {key}", "leave one of them out")
     fraction, drives = Open.from_value(getattr(table, key)), []
-    for number in range(1, len(pins) + 1) if table.throws is None else table.throws:
-        pin = _pin(pins, number, f"{where}.throws")
-        gain = -pin.reciprocating * cis(as_turn(pin.angle))
+    for number in range(1, len(throws) + 1) if table.throws is None else table.throws:
+        throw = _throw(throws, number, f"{where}.throws")
+        # eq. 13
+        parts = [cylinders[k] for k in throw.cylinders]
+        rotating = throw.unbalance + sum(p.rotating_mass * p.crank_radius * cis(as_turn(p.throw)) for p in parts)
+        gain = -sum(part.reciprocating_mass * part.crank_radius for part in parts) * cis(as_turn(throw.angle))
         name = f"{table.name}.{number}"
-        size = -pin.rotating + fraction.start * gain
-        into.add(Rotor(name, pin.x, size, pin.shaft, radius=table.radius), f"{where}.name")
+        size = -rotating + fraction.start * gain
+        into.add(Rotor(name, throw.x, size, throw.shaft, radius=table.radius), f"{where}.name")
         drives.append(RotorDrive(name, gain))
     if fraction.is_open:
         name, start = f"{table.name}.{key}", complex(fraction.start)
         into.decisions.append(Decision(name, "", Interval(*fraction.bounds), start, tuple(drives)))
 
 
-def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
-    if number > len(pins):
-        name = pins[0].shaft.name if pins else CRANKSHAFT.name
-        raise Refused(where, number, f"is no throw, the {name} has {len(pins)}", "count throws from 1 at the front")
-    return pins[number - 1]
+def _throw(throws: Sequence[Throw], number: int, where: str) -> Throw:
+    if number > len(throws):
+        name = throws[0].shaft.name if throws else CRANKSHAFT.name
+        raise Refused(where, number, f"is no throw, the {name} has {len(throws)}", "count throws from 1 at the front")
+    return throws[number - 1]
 
 
-def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
+def _single_counterweight(table: CounterweightTable, throws: Sequence[Throw], where: str, into: RotorList) -> None:
     reference, x = 0.0, None if table.x is None else Open.from_value(table.x).start
     refuse_keys(table, ("throws",), where, "is only for counterweights with balance_factor", "use opposite_throw")
     if table.opposite_throw is not None:
-        pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
-        reference, x = pin.angle + math.pi, pin.x if x is None else x
+        throw = _throw(throws, table.opposite_throw, f"{where}.opposite_throw")
+        reference, x = throw.angle + math.pi, throw.x if x is None else x
     if x is None:
         raise Refused(f"{where}.x", None, "is missing", "give the counterweight a position, or opposite_throw")
-    shaft = pins[0].shaft if pins else CRANKSHAFT
+    shaft = throws[0].shaft if throws else CRANKSHAFT
     _place(Rotor(table.name, x, 0j, shaft, radius=table.radius), table, reference, where, into)
     into.move(f"{table.name}.x", [table.name], 0, table.x)
 
@@ -238,12 +226,8 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
     leaders = {rotor.name: rotor for rotor in into.rotors if rotor.role is Role.BALANCER}
     if coupled.to not in leaders:
         remedy = nearest(coupled.to, list(leaders)) if leaders else "define the other one first"
-        raise Refused(
-            f"{where}.coupled.to",
-            coupled.to,
-            "is not the name of an unbalance that stands before this one in the file",
-            remedy,
-        )
+        rule = "is not the name of an unbalance that stands before this one in the file"
+        raise Refused(f"{where}.coupled.to", coupled.to, rule, remedy)
     leader = leaders[coupled.to]
     sign, mirrored = _HOW[coupled.how]
     value = sign * (leader.unbalance.conjugate() if mirrored else leader.unbalance)

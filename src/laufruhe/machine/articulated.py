@@ -14,10 +14,10 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
 from laufruhe.machine.bodies import Motion
 from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.roots import rising_root
 
-# largest number of Newton steps to a dead centre, and crank angles at which the lean of the rod is checked
-_ROUNDS = 60
 _STEPS = 720
+"""Number of crank angles at which the lean of the rod is checked."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +65,9 @@ class Knuckle:
     def length_to(self, reach: complex, bank: float) -> float:
         """Return the length of a rod whose piston pin comes to the point `reach` at its highest [m] (K13)."""
 
-        def slope(alpha: float) -> tuple[float, float]:
-            place, velocity, acceleration = self.motion(np, alpha, bank)
-            way = (place - reach).conjugate()
-            return float((way * velocity).real), float(abs(velocity) ** 2 + (way * acceleration).real)
+        def slope(alpha: float) -> float:
+            place, velocity, _ = self.motion(np, alpha, bank)
+            return float(((place - reach).conjugate() * velocity).real)
 
         place, _, _ = self.motion(np, _root(slope, 0.0), bank)
         return float(abs(reach - place))
@@ -107,13 +106,9 @@ class ArticulatedCrank(SliderCrank):
 
     @cached_property
     def dead_centres(self) -> tuple[float, float]:
-        """Local crank angles of the highest and lowest piston position [rad], by Newton's method (K13)."""
-
-        def slope(alpha: float) -> tuple[float, float]:
-            _, velocity, acceleration = self._piston(np, alpha)[0]
-            return float(velocity), float(acceleration)
-
-        return _root(slope, 0.0), _root(slope, math.pi)
+        """Local crank angles of the highest and lowest piston position [rad] (K13)."""
+        first, last = (_root(lambda alpha: float(self.velocity(np, alpha)), start) for start in (0.0, math.pi))
+        return first, last
 
     @property
     def stroke(self) -> float:
@@ -191,17 +186,9 @@ class ArticulatedCrank(SliderCrank):
         return replace(super().scaled(length, mass), knuckle=self.knuckle.scaled(length, mass))
 
 
-def _root(slope: Callable[[float], tuple[float, float]], start: float) -> float:
-    """Return the zero of a function near `start` by Newton's method; `slope` returns its value and derivative."""
-    angle = start
-    for _ in range(_ROUNDS):
-        value, derivative = slope(angle)
-        step = value / derivative if derivative else math.inf
-        if not abs(step) < 1.0:
-            break
-        angle -= step
-        if abs(step) <= 1e-14:
-            return angle
-    if abs(slope(angle)[0]) > 1e-12 * abs(slope(angle)[1]):
+def _root(function: Callable[[float], float], start: float) -> float:
+    # zero of a function within a radian of `start`
+    sign = math.copysign(1.0, function(start + 1.0))
+    if sign * function(start - 1.0) >= 0.0:
         raise ModelError(f"the piston has no dead centre near {math.degrees(start):g} deg; lengthen the rods")
-    return angle
+    return rising_root(lambda angle: sign * function(angle), start - 1.0, start + 1.0)

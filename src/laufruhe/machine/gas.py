@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from laufruhe import units
 from laufruhe.errors import ModelError
 
@@ -165,29 +167,14 @@ class PressureTrace:
 
     def __post_init__(self) -> None:
         check_pressures(self, "crankcase_pressure")
-        if len(self.angles) != len(self.pressures):
-            raise ModelError(
-                f"the trace has {len(self.angles)} angles and {len(self.pressures)} pressures; "
-                "give one pressure for each angle"
-            )
-        if len(self.angles) < 4:
-            raise ModelError(
-                f"the trace has {len(self.angles)} points, too few for a cycle; give one every few degrees"
-            )
-        for k, (angle, pressure) in enumerate(zip(self.angles, self.pressures, strict=True)):
-            where = f"point {k + 1} of the trace"
-            if not math.isfinite(angle):
-                raise ModelError(f"{where} has the angle {angle}, which must be finite; remove the point")
-            if k > 0 and angle <= self.angles[k - 1]:
-                raise ModelError(
-                    f"{where} at {math.degrees(angle):g} deg must come after the one before it at "
-                    f"{math.degrees(self.angles[k - 1]):g} deg; sort the trace and keep one point an angle"
-                )
-            if not 0.0 < pressure < math.inf:
-                raise ModelError(
-                    f"{where} has the pressure {pressure * 1e-5:g} bar, which must be positive and finite; "
-                    "give absolute pressures"
-                )
+        angles, pressures = np.asarray(self.angles, dtype=float), np.asarray(self.pressures, dtype=float)
+        if len(angles) != len(pressures) or len(angles) < 4:
+            rule = f"the trace has {len(angles)} angles and {len(pressures)} pressures"
+            raise ModelError(f"{rule}; give four points at least, each with an angle and a pressure")
+        if not (np.isfinite(angles).all() and (np.diff(angles) > 0.0).all()):
+            raise ModelError("the angles of the trace must be finite and rise; sort it and keep one point an angle")
+        if not (pressures.min() > 0.0 and np.isfinite(pressures).all()):
+            raise ModelError("the pressures of the trace must be positive and finite; give absolute pressures")
 
 
 def check_pressures(gas: object, *names: str) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
@@ -51,16 +51,6 @@ class Swept:
         return self.charge or self.piston
 
 
-class Shared(Protocol):
-    """Second piston of a chamber."""
-
-    def scaled(self, length: float) -> Any:
-        """Return the piston with lengths multiplied by this factor."""
-
-    def swept(self, part: SliderCrank) -> Swept:
-        """Return the shared chamber as seen by one of the pistons."""
-
-
 @dataclass(frozen=True)
 class SliderCrank:
     """Mechanism of one cylinder; other mechanisms are subclasses.
@@ -90,7 +80,7 @@ class SliderCrank:
     firing_angle
         Crank angle phi at which this cylinder fires [rad], within the cycle (C5).
     facing
-        Another piston that works in its chamber, out of step with it; None if there is none.
+        `Facing` piston that works in its chamber, out of step with it; None if there is none.
     big_end
         Diameter and width of the rod's bearing on the crank pin [m]; needed for a pressure only.
     """
@@ -109,7 +99,7 @@ class SliderCrank:
     firing_angle: float = 0.0
     shaft: Shaft = CRANKSHAFT
     big_end: tuple[float, float] | None = None
-    facing: Shared | None = None
+    facing: Any = None
     noun: ClassVar[str] = "cylinder"
     """Noun in its name, before its number."""
     has_pin_loads: ClassVar[bool] = True
@@ -229,7 +219,8 @@ class SliderCrank:
     @property
     def swept(self) -> Swept:
         """Space that its charge works in."""
-        return Swept(self) if self.facing is None else self.facing.swept(self)
+        swept: Swept = Swept(self) if self.facing is None else self.facing.swept(self)
+        return swept
 
     def lean(self, lib: Any, angles: Any) -> Any:
         """Return crank-pin force over gas force at crank angles after firing, turned to the cylinder axis (B2)."""

@@ -38,8 +38,6 @@ from laufruhe.physics.shaking_loads import rotor_loads, rotor_wrench
 from laufruhe.physics.star_loads import order_index, spread
 
 OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fidelity], Spectrum]
-PinReaction: TypeAlias = Callable[[SliderCrank, Array, ComplexArray, bool], tuple[Array, ...]]
-"""Reaction to the force at a piston pin, at some crank angles; the flag is True if masses at other pins count."""
 
 
 def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
@@ -159,9 +157,9 @@ def drag_factors(engine: Engine, point: OperatingPoint) -> Array:
 
 @lru_cache(maxsize=256)
 def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    load = _pin_load(cycle, part, speed, gas, fidelity, _at_pin)
+    load = _pin_loads(cycle, part, speed, gas, fidelity)
     y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
-    turned = load.mapped(lambda force: force @ np.array([[0.0, y, z], [0.0, z, -y]]))
+    turned = load.mapped(lambda forces: forces[:, 2:4] @ np.array([[0.0, y, z], [0.0, z, -y]]))
     # of a hinged rod nothing turns with the crank pin
     mass = part.rotating_mass if part.master_bank is None else 0.0
     rod = Rotor("rod", part.x, mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
@@ -181,44 +179,42 @@ def _of_crank(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | Non
     return series
 
 
+def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    return _pin_loads(cycle, part, speed, gas, fidelity).mapped(lambda forces: forces[:, :2])
+
+
+def _of_hinge(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    return _pin_loads(cycle, part, speed, gas, fidelity).mapped(lambda forces: forces[:, 4:])
+
+
 @lru_cache(maxsize=512)
-def _pin_load(
-    cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity, reaction: PinReaction
-) -> Spectrum:
-    """Return a reaction to the masses and the gas of one cylinder, shape (n, d) (B1, B2)."""
+def _pin_loads(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
+    """Return the loads of the masses and the gas of one cylinder, shape (n, 5) [N] (B1, B2, B11).
+
+    They are axial and side force on the piston pin, both on the rod's pin, and the wall force of a master's piston.
+    """
     if not part.has_pin_loads:
         raise ModelError(f"{part.name}: loads of its rod are not modelled; use forces on the block or the mounts")
     ratio = part.shaft.ratio
-    series = _inertia_orders(part, fidelity, reaction) * (ratio * speed) ** 2
+    series = _inertia_orders(part, fidelity) * (ratio * speed) ** 2
     moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
     moved = moved if ratio > 0.0 else moved.conj()
     load = fidelity.truncated(Spectrum(cycle.base_order, spread(moved, order_index(cycle, abs(ratio)))))
     if gas is not None:
-        load = load + fidelity.truncated(_gas_orders(cycle, part, gas, fidelity, reaction))
+        load = load + fidelity.truncated(_gas_orders(cycle, part, gas, fidelity))
     load.coefficients.setflags(write=False)
     return load
 
 
-def _at_piston(_: SliderCrank, __: Array, force: ComplexArray, ___: bool) -> tuple[Array, ...]:
-    return force.real, force.imag
-
-
-def _at_pin(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
-    pin_force = part.on_pin(np, alpha, force, with_masses)
-    return pin_force.real, pin_force.imag
-
-
-def _at_master(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
-    return (part.on_wall_of_master(np, alpha, part.on_pin(np, alpha, force, with_masses)),)
-
-
-_of_piston_pin = partial(_pin_load, reaction=_at_piston)
-_of_hinge = partial(_pin_load, reaction=_at_master)
+def _reactions(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
+    # columns of `_pin_loads` under a force at the piston pin; masses at other pins may count
+    pin = part.on_pin(np, alpha, force, with_masses)
+    return force.real, force.imag, pin.real, pin.imag, part.on_wall_of_master(np, alpha, pin)
 
 
 @lru_cache(maxsize=256)
-def _inertia_orders(part: SliderCrank, fidelity: Fidelity, reaction: PinReaction) -> ComplexArray:
-    """Return the inertia part at unit speed of the crank, by order of its own angle, shape (n, d) (B1, B2)."""
+def _inertia_orders(part: SliderCrank, fidelity: Fidelity) -> ComplexArray:
+    """Return the inertia part at unit speed of the crank, by order of its own angle, shape (n, 5) (B1, B2)."""
     is_short = fidelity.kinematics == "two-order" and type(part) is SliderCrank
 
     def loads(alpha: Array) -> tuple[Array, ...]:
@@ -231,22 +227,21 @@ def _inertia_orders(part: SliderCrank, fidelity: Fidelity, reaction: PinReaction
         across = -along * sine / cosine
         for inertia, (_, turning) in motion.swings if fidelity.rod == "rigid" and part.rod_ratio > 0.0 else ():
             across += inertia * turning / (part.rod_length * cosine)
-        return reaction(part, alpha, along + 1j * across, True)
+        return _reactions(part, alpha, along + 1j * across, True)
 
-    width = len(loads(np.zeros(1)))
-    table = resolved_orders(loads, np.ones((width, 1)), part.name).T
+    table = resolved_orders(loads, np.ones((5, 1)), part.name).T
     last = fidelity.local_orders(part.shaft.ratio)
     return table if last is None else table[: last + 1]
 
 
 @lru_cache(maxsize=256)
-def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity, reaction: PinReaction) -> Spectrum:
-    # gas part over the crank angle of the engine, shape (n, d) (B1, B2)
+def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity) -> Spectrum:
+    # gas part over the crank angle of the engine, shape (n, 5) (B1, B2)
     def loads(angles: Array) -> Array:
         total: Array | float = 0.0
         for since in (angles + lag for lag in part.swept.lags):
             thrust = thrust_at(gas, part, cycle, since) * part.lean(np, since)
-            total += np.stack(reaction(part, part.fires_at + part.shaft.ratio * since, thrust, False), axis=1)
+            total += np.stack(_reactions(part, part.fires_at + part.shaft.ratio * since, thrust, False), axis=1)
         return np.asarray(total)
 
     from_firing = spectrum_with_kinks(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from dataclasses import dataclass, field
-from functools import lru_cache, reduce
-from operator import add
+from functools import lru_cache
 
 import numpy as np
 
@@ -40,22 +39,19 @@ def _gas_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], gas: GasModel, fide
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in parts:
         alike[alike_under(gas, part), part.shaft.ratio].append(part)
-    stars = (_star(gas_coefficients(gas, star[0], cycle, fidelity), cycle, star) for star in alike.values())
     total = Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
-    return reduce(add, stars, total).mapped(lambda moment: moment[:, None] * ROLL)
+    for star in alike.values():
+        # torque of one cylinder at the firing angles of several
+        torque, firing = gas_coefficients(gas, star[0], cycle, fidelity), tuple(part.firing_angle for part in star)
+        phases = star_orders(np.ones((len(star), 1)), _delays(firing, cycle.turns), len(torque.coefficients))[:, 0]
+        kinks = torque.kinks and torque.kinks.repeated(firing, cycle.angle)
+        total = total + Spectrum(cycle.base_order, torque.coefficients * phases, kinks)
+    return total.mapped(lambda moment: moment[:, None] * ROLL)
 
 
 def forget_gas() -> None:
     """Clear the cache of stars of gas torque, for timing."""
     _gas_loads.cache_clear()
-
-
-def _star(torque: Spectrum, cycle: Cycle, parts: Sequence[SliderCrank]) -> Spectrum:
-    # torque of one cylinder at the firing angles of several
-    firing = tuple(part.firing_angle for part in parts)
-    star = star_orders(np.ones((len(parts), 1)), _delays(firing, cycle.turns), len(torque.coefficients))[:, 0]
-    kinks = torque.kinks and torque.kinks.repeated(firing, cycle.angle)
-    return Spectrum(cycle.base_order, torque.coefficients * star, kinks)
 
 
 @lru_cache(maxsize=256)

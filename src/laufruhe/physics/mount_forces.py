@@ -14,7 +14,6 @@ from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.norms import lengths
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.rigid_body import WRENCH, point_motion
 
@@ -98,7 +97,7 @@ def _scales(arm: float) -> Array:
 
 @dataclass(frozen=True)
 class CycleMeasures:
-    """Mean, maximum and root mean square over the cycle of a force's magnitude [N]."""
+    """Mean, maximum and rms over the cycle of a force's magnitude [N] (M4; Hasselgruber, Figs. 10-28)."""
 
     mean: float
     max: float
@@ -107,9 +106,3 @@ class CycleMeasures:
     def times(self, factor: float) -> CycleMeasures:
         """Return the measures in another unit."""
         return CycleMeasures(factor * self.mean, factor * self.max, factor * self.rms)
-
-
-def cycle_measures(samples: Array) -> CycleMeasures:
-    """Return mean, maximum and rms of |F(phi)| from samples (n, components) (M4; Hasselgruber, Figs. 10-28)."""
-    size = lengths(samples)
-    return CycleMeasures(float(size.mean()), float(size.max()), float(np.sqrt(np.mean(size**2))))

@@ -20,27 +20,22 @@ def star_loads(
     cycle: Cycle, parts: Sequence[SliderCrank], speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]
 ) -> Spectrum:
     """Return the wrench of all cylinders: coefficients of one times phase and weight of each, shape (n, 6) (L6)."""
-    alike: dict[Hashable, list[tuple[SliderCrank, Effect]]] = defaultdict(list)
+    alike: dict[tuple[Direction, Hashable, float], list[tuple[SliderCrank, Effect]]] = defaultdict(list)
     for part in parts:
         for effect in effects(part):
             alike[effect.direction, effect.shape, part.shaft.ratio].append((part, effect))
-    loads = [_load_of_alike(cycle, speed, members) for members in alike.values()]
+    loads = []
+    for (direction, _, ratio), members in alike.items():
+        series, square = members[0][1].series(), (ratio * speed) ** 2
+        weights = [np.multiply(effect.size * square, _wrench_of(direction, part)) for part, effect in members]
+        load = star_orders(np.array(weights), tuple([part.star_turn for part, _ in members]), len(series))
+        load *= series[:, None]
+        # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
+        loads.append(spread(load if ratio > 0.0 else load.conj(), order_index(cycle, abs(ratio))))
     total = np.zeros((max(map(len, loads), default=1), 6), dtype=complex)
     for load in loads:
         total[: len(load)] += load
     return Spectrum(cycle.base_order, total)
-
-
-def _load_of_alike(cycle: Cycle, speed: float, members: Sequence[tuple[SliderCrank, Effect]]) -> ComplexArray:
-    # load of equal effects of cylinders, by the orders of the cycle
-    (first, effect), *_ = members
-    series, ratio = effect.series(), first.shaft.ratio
-    square = (ratio * speed) ** 2
-    weights = [np.multiply(effect.size * square, _wrench_of(effect.direction, part)) for part, effect in members]
-    load = star_orders(np.array(weights), tuple([part.star_turn for part, _ in members]), len(series))
-    load *= series[:, None]
-    # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
-    return spread(load if ratio > 0.0 else load.conj(), order_index(cycle, abs(ratio)))
 
 
 def spread(load: ComplexArray, step: int) -> ComplexArray:

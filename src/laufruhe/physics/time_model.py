@@ -8,12 +8,12 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.dynamic import FluidTrack
-from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import DynamicSprings, ElasticMounting
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
+from laufruhe.physics.static_cases import stops_of
 
 NO_LAW = "a stiffness measured over frequency has no law in time; give a fluid_track, or leave time and run-ups out"
 
@@ -32,10 +32,10 @@ class TimeModel:
         From y and y' to the mount forces in the axes of C2, shape (3 mounts, n).
     gaps, stops
         Of the bump stops along every own axis, shape (3 springs,).
-    turns
-        Own axes of the springs, shape (springs, 3, 3).
-    places
-        Number of the mount of every spring, shape (springs,).
+    directions
+        From the forces of the bump stops to the mount forces, shape (3 mounts, 3 springs).
+    points
+        From y to the travel of the mounts in the axes of C2, shape (3 mounts, n).
     roll
         From y to the turn of the block about x, shape (n,).
     """
@@ -48,8 +48,8 @@ class TimeModel:
     damping_forces: Array
     gaps: Array
     stops: Array
-    turns: Array
-    places: Indices
+    directions: Array
+    points: Array
     roll: Array
 
     @property
@@ -60,7 +60,7 @@ class TimeModel:
     @property
     def has_stops(self) -> bool:
         """True if any bump stop can be met."""
-        return bool(np.any((self.stops > 0.0) & np.isfinite(self.gaps)))
+        return bool(np.any(self.stops > 0.0))
 
     def stop_forces(self, y: Array) -> Array:
         """Return the stop forces along the own axes, shape (3 springs, times), of y (n, times) (E27)."""
@@ -70,18 +70,13 @@ class TimeModel:
 
     def mount_forces(self, y: Array, rate: Array) -> Array:
         """Return the mount forces over time, shape (times, mounts, 3), from motion y and its rate, (n, times) each."""
-        out = np.array((self.forces @ y + self.damping_forces @ rate).T.reshape(y.shape[1], -1, 3))
-        if self.has_stops:
-            forces = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
-            np.add.at(out.swapaxes(0, 1), self.places, np.einsum("nma,mab->mnb", forces, self.turns))
-        return out
+        out = self.forces @ y + self.damping_forces @ rate
+        out = out + self.directions @ self.stop_forces(y) if self.has_stops else out
+        return np.asarray(out.T.reshape(y.shape[1], -1, 3))
 
     def mount_travels(self, y: Array) -> Array:
         """Return the mount deflections over time in the axes of C2, (times, mounts, 3), from motion y (n, times)."""
-        first = np.unique(self.places, return_index=True)[1]
-        travels = self.travels.reshape(len(self.turns), 3, -1)[first]
-        travels_in_c2 = np.einsum("mab,maj->mbj", self.turns[first], travels).reshape(-1, self.size)
-        return np.asarray((travels_in_c2 @ y).T.reshape(y.shape[1], -1, 3))
+        return np.asarray((self.points @ y).T.reshape(y.shape[1], -1, 3))
 
     def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
         """Return y'' of columns (n, times)."""
@@ -99,9 +94,7 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
     root = mass_root(mounting.block)
     vectors = np.linalg.solve(root.T, modes.shapes)
     motions = mounting.motions @ root.T
-    places, springs = zip(*every_spring(mounting.mounts), strict=True)
-    turns = np.array([spring.orientation for spring in springs])
-    mount_motions = np.einsum("mab,mbj->maj", turns, motions[list(places)])
+    stops = stops_of(mounting)
     spread = np.where(modes.squares > 0.0, 1.0 / np.sqrt(np.where(modes.squares > 0.0, modes.squares, 1.0)), 0.0)
     lossy = (mounting.losses @ (mounting.motions @ modes.shapes) * spread) @ vectors.T
     damper_forces = mounting.dampers @ motions + lossy
@@ -110,13 +103,13 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
         stiffness=root @ mounting.stiffness @ root.T,
         damping=np.einsum("mai,maj->ij", motions, damper_forces),
         load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
-        travels=mount_motions.reshape(-1, 6),
+        travels=stops.rows @ root.T,
         forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
         damping_forces=damper_forces.reshape(3 * mounts, 6),
-        gaps=np.repeat([spring.stop_gap for spring in springs], 3),
-        stops=np.repeat([spring.stop_stiffness for spring in springs], 3),
-        turns=turns,
-        places=np.array(places, dtype=np.intp),
+        gaps=stops.gaps,
+        stops=stops.stiffness,
+        directions=stops.directions,
+        points=motions.reshape(-1, 6),
         roll=root.T[3],
     )
     return _with_fluid(model, mounting.dynamic, root) if mounting.dynamic else model
@@ -148,6 +141,7 @@ def _with_fluid(model: TimeModel, dynamic: DynamicSprings, root: Array) -> TimeM
         damping=np.pad(model.damping, (wider, wider)) + np.diag(np.concatenate([np.zeros(6), damping / mass])),
         load=np.pad(model.load, (wider, (0, 0))),
         travels=np.pad(model.travels, ((0, 0), wider)),
+        points=np.pad(model.points, ((0, 0), wider)),
         forces=np.hstack([
             model.forces + dynamic.directions @ ((bulge - static)[:, None] * seen), -dynamic.directions * swelling
         ]),

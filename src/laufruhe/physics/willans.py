@@ -103,20 +103,12 @@ def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: flo
 
 
 def _line(x: Sequence[float], y: Sequence[float], what: str) -> tuple[float, float, Array]:
-    """Return intercept and slope of a line by least squares, and their covariances by its scatter."""
+    # intercept and slope of a line by least squares, and their covariances by its scatter
     if len(x) < FEWEST:
         raise ModelError(f"a line and its deviation take {FEWEST} points, and there are {len(x)}; measure more")
     places = sorted(x)
     size = max(abs(places[0]), abs(places[-1]))
     if any(b - a <= SAME * size for a, b in pairwise(places)):
         raise ModelError(f"one {what} is given twice; give the mean of its measured values")
-    # about the middle, where level and slope are independent of each other
-    middle, readings = float(np.mean(x)), np.asarray(y, dtype=float)
-    centred = np.asarray(x, dtype=float) - middle
-    spread = float(centred @ centred)
-    slope = float(centred @ readings) / spread
-    rest = readings - readings.mean() - slope * centred
-    scatter = float(rest @ rest) / (len(readings) - 2)
-    steep, level = scatter / spread, scatter / len(readings)
-    covariance = np.array([[level + middle**2 * steep, -middle * steep], [-middle * steep, steep]])
-    return float(readings.mean()) - slope * middle, slope, covariance
+    (slope, intercept), covariance = np.polyfit(x, y, 1, cov=True)
+    return float(intercept), float(slope), np.asarray(covariance)[::-1, ::-1]

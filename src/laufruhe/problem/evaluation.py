@@ -16,7 +16,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.mount_forces import CycleMeasures, cycle_measures
+from laufruhe.physics.mount_forces import CycleMeasures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.channels import MOUNT_FORCE, LoadChannel, NumberChannel
@@ -240,10 +240,9 @@ def place_measures(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_
     (periodic,), samples = one_period(evaluation.engine.cycle.base_order, [signal], BETWEEN * evaluation.samples)
     fine, coarse = (lengths(part.sample(samples)) for part in (periodic, periodic.series))
     top = np.maximum(fine.max(axis=0), lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0))
-    cached[k, channel] = [
-        replace(cycle_measures(values[:, None]), max=float(largest))
-        for values, largest in zip(coarse[::BETWEEN].T, top, strict=True)
-    ]
+    coarse = coarse[::BETWEEN]
+    numbers = zip(coarse.mean(axis=0), top, np.sqrt(np.mean(coarse**2, axis=0)), strict=True)
+    cached[k, channel] = [CycleMeasures(*map(float, triple)) for triple in numbers]
     return cached[k, channel]
 
 

@@ -17,8 +17,6 @@ from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
     FREQUENCIES,
     IRREGULARITY,
-    MOUNT_FORCE,
-    OF_BLOCK,
     OF_FLYWHEEL,
     OF_SHAFT_PLACES,
 )
@@ -46,7 +44,7 @@ from laufruhe.solvers.conclusion import (
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
 from laufruhe.solvers.decomposition import is_separable, solve_decomposed
-from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, imported, is_no_number, is_pointwise
+from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, imported, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
@@ -124,25 +122,6 @@ _CORE: tuple[Method, ...] = (
         "second-order cones of pistons", {**_UNBALANCES, Kind.PISTON: _AFFINE}, ProofStrength.EXACT, _SOLVE_CONES,
         refines_fidelity=True,
         proves="the optimum",
-    ),
-    Method(
-        "boxes of leads", {**_UNBALANCES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT,
-        imported(f"{_HERE}.boxes.leads:solve_leads"),
-        refines_fidelity=True,
-        known_channels=frozenset({IRREGULARITY}),
-        accepts_norm=is_pointwise,
-        accepts_constant=is_no_number,
-        proves="the optimum, as far as the boxes go (P13)",
-    ),
-    Method(
-        "boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT,
-        imported(f"{_HERE}.boxes.leads:solve_shared_leads"),
-        refines_fidelity=True,
-        known_channels=frozenset({MOUNT_FORCE, *OF_BLOCK}),
-        accepts_norm=is_pointwise,
-        accepts_constant=is_no_number,
-        accepts_problem=lambda p: p.engine.block is None and not p.fidelity.has_uneven_speed,
-        proves="the optimum, as far as the boxes go (P15)",
     ),
     Method(
         "cones over boxes of places", {**_UNBALANCES, Kind.PLACE: _PLACED}, ProofStrength.EXACT,

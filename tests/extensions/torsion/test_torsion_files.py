@@ -85,7 +85,7 @@ def test_what_a_quantity_needs() -> None:
     tables = tables_of(READY)
     for objective, crank, said in (
         ({"minimise": "maximum shaft stress", "sections": ["throw 1"]}, None, "is no shaft section here"),
-        ({"minimise": "rms shaft twist", "bearings": ["1"]}, None, "means nothing for a shaft twist"),
+        ({"minimise": "rms shaft twist", "bearings": ["1"]}, None, "means nothing for shaft twist"),
         ({"minimise": "absorber heat"}, None, "can be limited but not minimised"),
         ({"minimise": "rms shaft stress"}, "none", "needs the diameter of a shaft"),
     ):

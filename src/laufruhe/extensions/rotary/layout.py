@@ -48,15 +48,11 @@ class Rotary(Inline):
             raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.quantity_text(radius, "m"))
         rotor_numbers = {key: options[key] for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
         mass = options["rotor_mass"]
-        return Mechanism(
-            options["eccentricity"],
-            math.inf,
-            0.0,
-            rod_rotating_mass=mass,
-            kind=RotaryUnit,
-            numbers=rotor_numbers,
-            **shared,
-        )
+        unit = RotaryUnit(
+            f"{RotaryUnit.noun} 1", 0.0, options["eccentricity"], math.inf, 0.0, rotating_mass=mass,
+            big_end=shared["big_end"], **rotor_numbers,
+        )  # fmt: skip
+        return Mechanism(unit, shared["rotating_mass"])
 
 
 ROTARY = Rotary()

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import KeyedError
 from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.machine.drives.base import DriveKind, Sizes
 from laufruhe.machine.layouts.base import LayoutKey
-from laufruhe.machine.layouts.build import Mechanism
+from laufruhe.machine.slider_crank import SliderCrank, as_kind
 
 
 class SwingingYokeDrive(DriveKind):
@@ -53,7 +52,7 @@ class SwingingYokeDrive(DriveKind):
             raise KeyedError("lever_length", rule, f"{1e3 * length:g} mm")
         return float(pivot * share)
 
-    def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:
+    def mechanism(self, plain: SliderCrank, sizes: Sizes) -> SwingingYoke:
         """Return the mechanism with lever, lever weight and ram path."""
         numbers, pivot = sizes.options, sizes.options["pivot_distance"]
         length = 0.5 * sizes.stroke * pivot / plain.crank_radius
@@ -63,14 +62,14 @@ class SwingingYokeDrive(DriveKind):
                 "is missing, but lever_weight is given; add the distance of the weight from the pivot",
             )
         lever_numbers: dict[str, Any] = {
-            "pivot": pivot, "lever_length": length, "ram_height": plain.offset,
+            "pivot": pivot, "lever_length": length, "ram_height": sizes.offset,
             "lever_weight": numbers["lever_weight"] or 0.0,
             "lever_weight_radius": numbers["lever_weight_radius"] or 0.0,
         }  # fmt: skip
         if numbers["lever"] is not None:
             names = {"mass": "lever_mass", "centre_of_gravity": "lever_centre", "inertia": "lever_inertia"}
             lever_numbers |= {name: numbers["lever"][key] for key, name in names.items()}
-        return replace(plain, offset=0.0, kind=SwingingYoke, numbers=lever_numbers)
+        return as_kind(SwingingYoke, plain, **lever_numbers)
 
 
 SWINGING_YOKE = SwingingYokeDrive()

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.layouts.base import LayoutKey
-from laufruhe.machine.layouts.build import Mechanism
+from laufruhe.machine.slider_crank import SliderCrank
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class DriveKind:
             )
         return math.sqrt(square)
 
-    def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:  # noqa: ARG002
+    def mechanism(self, plain: SliderCrank, sizes: Sizes) -> SliderCrank:  # noqa: ARG002
         """Return the mechanism of every cylinder from the numbers that all drives share; these alone by default."""
         return plain
 

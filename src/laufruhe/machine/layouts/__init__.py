@@ -14,7 +14,6 @@ from laufruhe.machine.layouts.build import (
     angles_in_order,
     build,
     even_throws,
-    firing_angles,
     throw_rotors,
 )
 from laufruhe.machine.layouts.delta import Delta
@@ -39,7 +38,6 @@ __all__ = [
     "build",
     "even_throws",
     "facing_pistons",
-    "firing_angles",
     "inline",
     "rod_of",
     "stations",

@@ -87,7 +87,7 @@ def in_rows(layout: Layout, inputs: LayoutInput) -> Layout:
     # throws are still counted from the front
     leans = [0.5 * angle * (-1.0) ** pin for pin in layout.pins]
     layout = replace(layout, banks=tuple(bank + lean for bank, lean in zip(layout.banks, leans, strict=True)))
-    offsets = [inputs.at_place(place).mechanism.offset for place in range(inputs.cylinders)]
+    offsets = [inputs.at_place(place).mechanism.part.offset for place in range(inputs.cylinders)]
     if not any(offsets):
         return layout
     signed = (math.copysign(offset, lean * offset) for offset, lean in zip(offsets, leans, strict=True))

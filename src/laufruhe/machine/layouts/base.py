@@ -129,7 +129,7 @@ class LayoutInput:
     @property
     def crank_distance(self) -> float:
         """Distance of the two cranks of opposed pistons [m], whose axes have no offset."""
-        distance, offset = self.options["crank_distance"], self.mechanism.offset
+        distance, offset = self.options["crank_distance"], self.mechanism.part.offset
         if distance is None:
             raise KeyedError("crank_distance", "is missing; add the distance between two cranks")
         if offset:
@@ -224,17 +224,14 @@ class LayoutKind(ABC):
 def _with_dead_centres(layout: Layout, inputs: LayoutInput) -> Layout:
     """Return the layout with the offset and true dead centre of every cylinder, if these differ."""
     mechanisms = [inputs.at_place(place).mechanism for place in range(inputs.cylinders)]
-    offsets = layout.offsets or tuple(mechanism.offset for mechanism in mechanisms)
+    offsets = layout.offsets or tuple(mechanism.part.offset for mechanism in mechanisms)
     if layout.firing_delays or not any(offsets):
         return layout
-    if any(mechanism.kind is not SliderCrank for mechanism in mechanisms):
+    if any(type(mechanism.part) is not SliderCrank for mechanism in mechanisms):
         if layout.offsets or inputs.single:
             raise KeyedError("offset", "needs a slider-crank if cylinders differ; leave the offset out")
         return layout
-    parts = (
-        replace(mechanism, offset=offset).cylinder(1, 0.0, 0.0, 0.0, 0.0)
-        for mechanism, offset in zip(mechanisms, offsets, strict=True)
-    )
+    parts = (replace(mechanism.part, offset=offset) for mechanism, offset in zip(mechanisms, offsets, strict=True))
     delays = tuple(part.dead_centres[0] for part in parts)
     if len(set(delays)) == 1 and not layout.offsets:
         return layout

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 from laufruhe.errors import ModelError, counted
 from laufruhe.machine.engine import Cycle
@@ -18,39 +17,20 @@ from laufruhe.numerics.exact_angles import SAME_TURN, Turn, angle_of, as_turn, c
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Numbers of a cylinder, which all cylinders of an engine share unless some have their own.
+    """Slider-crank of a cylinder at angles of zero, which all cylinders share unless some have their own.
 
     Attributes
     ----------
-    crank_radius, rod_length, offset, bore, big_end
-        Lengths [m]; see `SliderCrank`.
-    reciprocating_mass
-        Reciprocating mass per cylinder [kg].
+    part
+        Slider-crank; its mass at the crank pin is that of the rod alone.
     rotating_mass
         Rotating mass per throw without rods, at the crank radius [kg].
     pin_mass
         Part of the rotating mass of its throw that belongs to this cylinder [kg]; None for an equal share.
-    rod_rotating_mass
-        Share of the rod at the crank pin, per cylinder [kg].
-    rod_inertia_deficit
-        Inertia of the rod less that of its two masses [kg m2] (eq. 10).
-    kind
-        Class of the slider-cranks.
-    numbers
-        Fields that only this class has.
     """
 
-    crank_radius: float
-    rod_length: float
-    reciprocating_mass: float
+    part: SliderCrank
     rotating_mass: float = 0.0
-    rod_rotating_mass: float = 0.0
-    rod_inertia_deficit: float = 0.0
-    offset: float = 0.0
-    bore: float | None = None
-    big_end: tuple[float, float] | None = None
-    kind: type[SliderCrank] = SliderCrank
-    numbers: Mapping[str, Any] = field(default_factory=dict)
     pin_mass: float | None = None
 
     def mass_at_pin(self, cylinders: int) -> float:
@@ -58,33 +38,14 @@ class Mechanism:
         return self.rotating_mass / cylinders if self.pin_mass is None else self.pin_mass
 
     def cylinder(
-        self,
-        number: int,
-        x: float,
-        throw: float,
-        bank: float,
-        firing_angle: float,
-        pin_mass: float = 0.0,
+        self, number: int, x: float, throw: float, bank: float, firing_angle: float, pin_mass: float = 0.0,
         shaft: Shaft = CRANKSHAFT,
-    ) -> SliderCrank:
+    ) -> SliderCrank:  # fmt: skip
         """Return the slider-crank of a cylinder, with a mass at the crank pin without the rod's share [kg]."""
-        return self.kind(
-            name=f"{self.kind.noun} {number}",
-            x=x,
-            crank_radius=self.crank_radius,
-            rod_length=self.rod_length,
-            reciprocating_mass=self.reciprocating_mass,
-            throw=throw,
-            bank=bank,
-            offset=self.offset,
-            rotating_mass=pin_mass + self.rod_rotating_mass,
-            rod_inertia_deficit=self.rod_inertia_deficit,
-            bore=self.bore,
-            firing_angle=firing_angle,
-            shaft=shaft,
-            big_end=self.big_end,
-            **self.numbers,
-        )
+        return replace(
+            self.part, name=f"{self.part.noun} {number}", x=x, throw=throw, bank=bank, firing_angle=firing_angle,
+            rotating_mass=pin_mass + self.part.rotating_mass, shaft=shaft,
+        )  # fmt: skip
 
 
 def angles_in_order(
@@ -120,18 +81,6 @@ def angles_in_order(
         angles[number - 1] = angle_of(centre)
         previous = centre
     return tuple(angles)
-
-
-def firing_angles(
-    cycle: Cycle,
-    layout: Layout,
-    throws: Sequence[float],
-    firing_order: Sequence[int],
-    intervals: Sequence[float] = (),
-) -> tuple[float, ...]:
-    """Return the crank angles at which the cylinders of a layout fire [rad]; see `angles_in_order`."""
-    centres = [layout.dead_centre(throws, k) for k in range(len(layout.positions))]
-    return angles_in_order(cycle, centres, firing_order, intervals)
 
 
 def even_throws(
@@ -207,19 +156,16 @@ def build(
     if len(angles) != len(layout.throw_positions):
         raise ModelError(f"{counted(len(angles), 'throw')} given, but the layout has {len(layout.throw_positions)}")
     cylinders = range(len(layout.positions))
+    centres = [layout.dead_centre(angles, k) for k in cylinders]
     fires = (
-        firing_angles(cycle, layout, angles, firing_order, intervals)
+        angles_in_order(cycle, centres, firing_order, intervals)
         if firing_order
-        else tuple(angle_of(reduced_turn(layout.dead_centre(angles, k), 1)) for k in cylinders)
+        else [angle_of(reduced_turn(centre, 1)) for centre in centres]
     )
     mechanisms = [mechanism] * len(cylinders) if isinstance(mechanism, Mechanism) else mechanism
     slider_cranks = tuple(
         mechanisms[k].cylinder(
-            k + 1,
-            layout.positions[k],
-            angles[layout.pins[k]] + layout.pin_offsets[k],
-            layout.banks[k],
-            fires[k],
+            k + 1, layout.positions[k], angles[layout.pins[k]] + layout.pin_offsets[k], layout.banks[k], fires[k]
         )
         for k in cylinders
     )
@@ -240,5 +186,5 @@ def throw_unbalance(mechanisms: Sequence[Mechanism]) -> float:
     """Return the unbalance of a throw without rods, from the mechanisms of the cylinders on it [kg m]."""
     first, count = mechanisms[0], len(mechanisms)
     if all(mechanism.pin_mass is None for mechanism in mechanisms):
-        return first.rotating_mass * first.crank_radius
-    return sum(mechanism.mass_at_pin(count) for mechanism in mechanisms) * first.crank_radius
+        return first.rotating_mass * first.part.crank_radius
+    return sum(mechanism.mass_at_pin(count) for mechanism in mechanisms) * first.part.crank_radius

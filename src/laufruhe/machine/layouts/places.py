@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from laufruhe.numerics.exact_angles import Turn, as_turn
 
@@ -74,18 +75,12 @@ class Layout:
         """Return the layout whose cylinder k stands at place `places[k]`; throws go by their first cylinder."""
         pins = [self.pins[place] for place in places]
         throws = list(dict.fromkeys(pins))
-        return replace(
-            self,
-            positions=tuple(self.positions[place] for place in places),
-            banks=tuple(self.banks[place] for place in places),
-            pins=tuple(throws.index(pin) for pin in pins),
-            pin_offsets=tuple(self.pin_offsets[place] for place in places),
-            throw_positions=tuple(self.throw_positions[throw] for throw in throws),
-            sides=self.sides and tuple(self.sides[place] for place in places),
-            firing_delays=self.firing_delays and tuple(self.firing_delays[place] for place in places),
-            offsets=self.offsets and tuple(self.offsets[place] for place in places),
-            throws=self.throws and tuple(self.throws[throw] for throw in throws),
-        )
+        keys = {"positions": places, "banks": places, "pin_offsets": places, "sides": places, "firing_delays": places,
+                "offsets": places, "throw_positions": throws, "throws": throws}  # fmt: skip
+        numbers: dict[str, Any] = {
+            key: tuple(values[k] for k in order) for key, order in keys.items() if (values := getattr(self, key))
+        }
+        return replace(self, pins=tuple(map(throws.index, pins)), **numbers)
 
     def side(self, k: int) -> float:
         """Return the share of the bank angle at which cylinder k leans: 1/2 left, -1/2 right."""

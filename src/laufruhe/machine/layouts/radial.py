@@ -84,7 +84,7 @@ def _check(inputs: LayoutInput) -> None:
     master, knuckle_angles = options["master_cylinder"] or 1, options["knuckle_angles"]
     if options["knuckle_radius"] is None:
         raise KeyedError("knuckle_radius", "is missing; add it, 0 mm puts all rods on the crank pin")
-    if math.isinf(inputs.mechanism.rod_length):
+    if math.isinf(inputs.mechanism.part.rod_length):
         raise KeyedError("rod_ratio", "makes a Scotch yoke, which has no master rod; give more", "0")
     if master > count:
         raise KeyedError("master_cylinder", f"is not one of the {count} cylinders; count cylinders from 1", str(master))
@@ -101,7 +101,7 @@ def _hinged(inputs: LayoutInput, on_crank: Sequence[SliderCrank]) -> tuple[Slide
     Without a length of articulated rods every piston comes as high as the master's; a knuckle radius of zero leaves
     all rods on the crank pin.
     """
-    options, mechanism, index = inputs.options, inputs.mechanism, (inputs.options["master_cylinder"] or 1) - 1
+    options, mechanism, index = inputs.options, inputs.mechanism.part, (inputs.options["master_cylinder"] or 1) - 1
     radius, length, master_bank = mechanism.crank_radius, mechanism.rod_length, on_crank[index].bank
     master = SliderCrank("master rod", 0.0, radius, length, 0.0, 0.0, master_bank, mechanism.offset)
     top = complex(math.sqrt((length + radius) ** 2 - mechanism.offset**2), mechanism.offset)

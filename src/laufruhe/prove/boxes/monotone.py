@@ -90,11 +90,15 @@ class _MonotoneBoxes(BoxBisection):
 
     def bound_box(self, lower: Array, upper: Array) -> tuple[float, Box] | FathomedPart:
         """Return the lower bound of the objective on a box, and the box without infeasible slices at its ends."""
-        contracted = _cut(self._problem, lower, upper)
-        if contracted is None:
+        problem, lower, upper = self._problem, lower.copy(), upper.copy()
+        if any(function.minimum_over(lower, upper) > maximum for maximum, function in problem.limits):
             return FathomedPart(self.level)
-        side = widest(*contracted, self._problem.upper - self._problem.lower)
-        return self._problem.minimum_over(*contracted), Box(*contracted, side)
+        for k in range(len(lower)):
+            # a falling function is large at the lower end, even with all other numbers where it is least
+            lower[k] = _cut_side(problem, lower, upper, k, -1.0)
+            upper[k] = _cut_side(problem, lower, upper, k, 1.0)
+        side = widest(lower, upper, problem.upper - problem.lower)
+        return problem.minimum_over(lower, upper), Box(lower, upper, side)
 
     def halve(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | FathomedPart]:
         """Return the halves of boxes across their relatively longest side."""
@@ -117,18 +121,6 @@ def bisect_monotone(
         thin = around.bound_box(*thin_box(witness.place, problem.lower, problem.upper))
         witness.check_near(boxes.what, math.inf if isinstance(thin, FathomedPart) else thin[0])
     return boxes.run(boxes.bound_box(problem.lower, problem.upper), max_boxes)
-
-
-def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-    # bounds of the box without slices at its sides that violate a limit; None if nothing is left
-    if any(function.minimum_over(lower, upper) > maximum for maximum, function in problem.limits):
-        return None
-    lower, upper = lower.copy(), upper.copy()
-    for k in range(len(lower)):
-        # a falling function is large at the lower end, even with all other numbers where it is least
-        lower[k] = _cut_side(problem, lower, upper, k, -1.0)
-        upper[k] = _cut_side(problem, lower, upper, k, 1.0)
-    return lower, upper
 
 
 def _cut_side(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign: float) -> float:

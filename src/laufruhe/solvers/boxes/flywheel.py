@@ -54,8 +54,7 @@ class _Coordinates:
     @classmethod
     def from_problem(cls, problem: Problem, by_mass: bool) -> _Coordinates:
         """Return the coordinates of a flywheel's open rim sizes; if `by_mass`, the rim's mass replaces its width."""
-        if problem.engine.flywheel is None:
-            raise TypeError("the engine has no flywheel")
+        assert problem.engine.flywheel is not None
         names = [decision.name for decision in problem.decisions]
         has_mass = by_mass and len(names) > 1 and WIDTH in names
         return cls(problem, problem.engine.flywheel, names.index(WIDTH) if has_mass else None)
@@ -105,8 +104,7 @@ class _Coordinates:
             )
 
         def monotone(measure: Measure) -> Monotone:
-            if measure.channel.flywheel_value is None:
-                raise TypeError(f"{measure.name} is not a measure of the flywheel")
+            assert measure.channel.flywheel_value is not None
             flywheel_value = measure.channel.flywheel_value(measure, initial)
             sign = -1.0 if falls_with_flywheel(measure.channel) else 1.0
             return Monotone(lambda x: flywheel_value(self.wheel(x)), np.full(len(lower), sign))

@@ -40,8 +40,6 @@ EXACT_SPREAD = 1e-6
 STEP_SHARE = 1e-3
 # tolerance of limits on distances, and margin when positions move into these limits [m]
 DISTANCE_TOLERANCE, MARGIN = 1e-9, 1e-7
-# bisections to shrink each side of a box
-HALVINGS = 10
 # corners of a box from which local searches for feasible positions start
 MAX_CORNERS = 16
 
@@ -106,8 +104,6 @@ def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Prop
 class PlaceSearch(RebalancedSearch[_Box]):
     """Branch and bound search over the open positions of a problem."""
 
-    is_shared = True
-
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.relaxation = Relaxation(problem, SHARE)
@@ -137,7 +133,6 @@ class PlaceSearch(RebalancedSearch[_Box]):
         if violated:
             self.add_conflict(violated)
             return INFEASIBLE_PART
-        lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
         result = self._solve(relaxed)
         if result.status is Status.INFEASIBLE:
@@ -183,25 +178,6 @@ class PlaceSearch(RebalancedSearch[_Box]):
             if minimum > limit.maximum + DISTANCE_TOLERANCE or maximum < limit.minimum - DISTANCE_TOLERANCE:
                 return (limit.name,)
         return ()
-
-    def _shrunk(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return a box without slices at its ends in which every position violates a limit on distances."""
-        lower, upper = lower.copy(), upper.copy()
-        for side, is_upper in product(range(len(lower)) if self._envelope else (), (True, False)):
-            low, high, width = 0.0, 1.0, upper[side] - lower[side]
-            for _ in range(HALVINGS):
-                share = 0.5 * (low + high)
-                first, last = lower.copy(), upper.copy()
-                if is_upper:
-                    first[side] = upper[side] - share * width
-                else:
-                    last[side] = lower[side] + share * width
-                low, high = (share, high) if self._violated(first, last) else (low, share)
-            if is_upper:
-                upper[side] -= low * width
-            else:
-                lower[side] += low * width
-        return lower, upper
 
     def _move_into_limits(self, middle: Array, lower: Array, upper: Array) -> Array | None:
         """Return positions in a box close to `middle` that keep the limits on distances [m], or None."""
@@ -277,8 +253,6 @@ class PlaceSearch(RebalancedSearch[_Box]):
 
 class _PlaceSearchByMethod(PlaceSearch):
     """Branch and bound search over positions, with a general solver for the other decisions."""
-
-    is_shared = False
 
     def __init__(self, problem: Problem, prove: Solve) -> None:
         super().__init__(problem)

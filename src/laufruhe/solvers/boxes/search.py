@@ -1,23 +1,20 @@
-"""Branch and bound over boxes with a design from each box; worker processes compute boxes ahead (P9)."""
+"""Branch and bound over boxes with a design from each box (P9)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Generic, Protocol, TypeVar
+from collections.abc import Iterator, Sequence
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from laufruhe.numerics.budget import is_time_over
-from laufruhe.numerics.workers import Speculation, speculation
 from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
 from laufruhe.prove.certificate import gap_of
 from laufruhe.prove.witness import Witness
 
 # share of the tolerance at which the gap counts as closed
 GAP_SAFETY = 0.99
-# boxes that workers compute ahead
-AHEAD = 32
 
 
 class SearchBox(Protocol):
@@ -49,14 +46,7 @@ D = TypeVar("D", bound=BoxDesign)
 
 
 class BoxSearch(Generic[B, D]):
-    """Boxes and designs of a method; worker processes may divide the boxes of a shared search."""
-
-    is_shared = False
-
-    @property
-    def conflict(self) -> tuple[str, ...]:
-        """Names of limits that boxes without a feasible design violate."""
-        raise NotImplementedError
+    """Boxes and designs of a method."""
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | FathomedPart, D | None]]:
         """Yield parts that together make up a box, each with a design in it, or None.
@@ -82,20 +72,14 @@ class BoxSearch(Generic[B, D]):
         """Return a thin box around a design, with its bound; None if the method builds none."""
         raise NotImplementedError
 
-    def add_conflict(self, conflict: Sequence[str]) -> None:
-        """Add names of limits that boxes of a worker process violate."""
-
 
 class _Branching(BranchAndBound[B], Generic[B, D]):
     """Branch and bound that stores the best design of all boxes."""
 
-    def __init__(
-        self, search: BoxSearch[B, D], best: D, zero_level: float, tolerance: float, what: str,
-        ahead: Speculation[Any, Any],
-    ) -> None:  # fmt: skip
+    def __init__(self, search: BoxSearch[B, D], best: D, zero_level: float, tolerance: float, what: str) -> None:
         self.what, self.best, self.value = what, best, best.value
         self.witness = search.witness_of(best)
-        self._search, self._zero_level, self._tolerance, self._ahead = search, zero_level, tolerance, ahead
+        self._search, self._zero_level, self._tolerance = search, zero_level, tolerance
 
     @property
     def level(self) -> float:
@@ -113,19 +97,13 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
         return gap <= GAP_SAFETY * self._tolerance or (gap < np.inf and node.part.is_exact)
 
     def branch(self, nodes: Sequence[OpenNode[B]]) -> BoundedParts[B]:
-        """Yield the parts of a box with their bounds, computed ahead by workers if the search is shared."""
-        ((bound, name, box),) = nodes
-        search, step = self._search, (self._search, box, self.value)
-        if search.is_shared:
-            next_steps = ((number, (search, part, self.value)) for _, number, part in self.next_nodes(AHEAD))
-            self._ahead.prefetch([(name, step), *next_steps])
-        parts, conflict = self._ahead.result(name, step)
-        search.add_conflict(conflict)
-        for part, design in parts:
+        """Yield the parts of a box with their bounds."""
+        ((bound, _, box),) = nodes
+        for part, design in self._search.parts(box, self.value):
             if design is not None and design.rank < self.best.rank:
-                self.best, self.value, self.witness = design, design.value, search.witness_of(design)
+                self.best, self.value, self.witness = design, design.value, self._search.witness_of(design)
             yield part if isinstance(part, FathomedPart) else (part.bound, part)
-            if not search.is_shared and is_time_over():
+            if is_time_over():
                 # the remaining parts have at least the bound of the box
                 yield bound, box
                 return
@@ -149,17 +127,10 @@ def divide_boxes(
     -------
     The best design, the lower bound of all designs (infinite if none is feasible), and the number of boxes.
     """
-    with speculation(_split_box) as ahead:
-        boxes = _Branching(search, best, zero_level, tolerance, what, ahead)
-        bound = boxes.divide((root.bound, root), maximum)
+    boxes = _Branching(search, best, zero_level, tolerance, what)
+    bound = boxes.divide((root.bound, root), maximum)
     if boxes.witness is not None:
         thin = search.around(boxes.best)
         if thin is not None:
             boxes.witness.check_near(what, thin.level if isinstance(thin, FathomedPart) else thin.bound)
     return boxes.best, bound, boxes.node_count
-
-
-def _split_box(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:
-    search, box, value = step
-    parts = search.parts(box, value)
-    return (list(parts) if search.is_shared else parts), search.conflict

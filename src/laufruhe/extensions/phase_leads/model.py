@@ -18,7 +18,7 @@ from laufruhe.machine import CRANKSHAFT
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.problem.decision import Kind
+from laufruhe.problem.decision import Kind, real_bounds
 from laufruhe.problem.measure import Measure, kinks_of, load_rows, narrow_signal
 from laufruhe.problem.problem import Problem
 
@@ -43,13 +43,18 @@ class LoadPart:
 
     def earlier(self, lead: float) -> LoadPart:
         """Return the part of the load if its shaft runs ahead by another lead angle [rad]."""
-        return self.mapped(lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else self
+        return self.mapped(lambda signal: earlier(signal, lead)) if lead else self
 
     def mapped(self, change: Callable[[Spectrum], Spectrum]) -> LoadPart:
         """Return the part of the load with the function `change` applied to every spectrum."""
         return LoadPart(
             [change(signal) for signal in self.bare], [[change(signal) for signal in column] for column in self.columns]
         )
+
+
+def earlier(signal: Spectrum, lead: float) -> Spectrum:
+    """Return a signal that comes earlier by a lead angle [rad]."""
+    return signal.shift(-lead / signal.period, -lead) if lead else signal
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +91,7 @@ class PhaseLeadModel:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.leads = tuple(d for d in problem.decisions if d.kind is Kind.LEAD)
-        self.lower, self.upper = (np.array([getattr(d, side) for d in self.leads]) for side in ("lower", "upper"))
+        self.lower, self.upper = real_bounds(self.leads)
         self.start = np.array([d.real_start for d in self.leads])
         self.names = [shaft for d in self.leads for shaft in d.keys(Kind.LEAD)]
         self.base_model = AffineModel(replace(problem, decisions=problem.unbalances), True, True)

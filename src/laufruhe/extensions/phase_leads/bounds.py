@@ -24,14 +24,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from laufruhe.extensions.phase_leads.irregularity import LeadSwing
+from laufruhe.extensions.phase_leads.model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.load_models.affine import AffineProblem
-from laufruhe.load_models.phase_lead_model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import lengths
 from laufruhe.numerics.norms.norm import curvature, mean_square
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.boxes.lead_swing import LeadSwing
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
 
 WIDE = 1.2

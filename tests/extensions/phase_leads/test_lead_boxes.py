@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
+from laufruhe.extensions.phase_leads.bounds import minimum_on_arcs
 from laufruhe.problem.decision import Decision, RotorDrive, domains_of
 from laufruhe.problem.sets import Interval, Sector
-from laufruhe.prove.boxes.leads import minimum_on_arcs
 
 DOMAINS = domains_of((
     Decision("size", "kg m", Interval(-0.3, 0.7), 0.0, (RotorDrive("web", 1.0),)),

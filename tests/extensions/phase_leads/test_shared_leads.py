@@ -12,13 +12,13 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import ModelError
+from laufruhe.extensions.phase_leads.shared_gas import CELLS, SharedGasBoxes, torque_change
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Cycle, Seiliger, Shaft, SliderCrank
 from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.boxes.shared_gas import CELLS, SharedGasBoxes, torque_change
 from problem_files import PROBLEMS
 from searched import searched
 

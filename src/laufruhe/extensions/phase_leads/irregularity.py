@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.phase_lead_model import PhaseLeadModel, problem_of_shafts
+from laufruhe.extensions.phase_leads.model import PhaseLeadModel, earlier, problem_of_shafts
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import curvature
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
@@ -70,9 +70,9 @@ class LeadSwing:
     def _minimum_at_point(self, speed: float, parts: Sequence[_Part], middle: Array, half: Array) -> float:
         changes = [0.0, *(middle - self._start)]
         work: Array = np.sum(
-            [_earlier(part.work, d).sample(self._steps) for part, d in zip(parts, changes, strict=True)], axis=0
+            [earlier(part.work, d).sample(self._steps) for part, d in zip(parts, changes, strict=True)], axis=0
         )
-        swinging = [_earlier(part.inertia, d).sample(self._steps) for part, d in zip(parts, changes, strict=True)]
+        swinging = [earlier(part.inertia, d).sample(self._steps) for part, d in zip(parts, changes, strict=True)]
         inertia: Array = self._turning + np.sum(swinging, axis=0)
         work_error = float(sum(part.torque * r for part, r in zip(parts[1:], half, strict=True)))
         inertia_error = float(sum(part.slope * r for part, r in zip(parts[1:], half, strict=True)))
@@ -96,10 +96,6 @@ class LeadSwing:
             math.sqrt(2.0 * max(high + work[k] + work_error, 0.0) / (inertia[k] - inertia_error)) for k in (a, b)
         ]
         return max(float(difference), 0.0) / sum(fastest) / speed
-
-
-def _earlier(signal: Spectrum, lead: float) -> Spectrum:
-    return signal.shift(-lead / signal.period, -lead) if lead else signal
 
 
 def largest_torque(torque: Spectrum) -> float:

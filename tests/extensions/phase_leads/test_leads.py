@@ -10,11 +10,11 @@ import pytest
 
 import moving_masses as mm
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.phase_leads.solver import LeadSearch, _Box
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.boxes.leads import LeadSearch, _Box
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.result import Status
 from problem_files import PROBLEMS, changed, loaded

@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.phase_lead_model import PhaseLeadModel
+from laufruhe.extensions.phase_leads.model import PhaseLeadModel
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank, kinematics
 from laufruhe.machine.chambers import cylinder_gas, models_of
 from laufruhe.machine.facing import Facing
@@ -42,31 +42,19 @@ CELLS = 1440
 _STEPS = 256
 
 
-@dataclass(frozen=True)
-class _Travel:
-    """Travel of a piston towards its crank, by crank radius [m] and rod ratio."""
+def _travel(radius: float, ratio: float, angle: Array | float) -> tuple[Array, Array, Array]:
+    # travel of a piston towards its crank [m], and its first two derivatives by the crank angle
+    shape = np, np.asarray(angle), ratio
+    laws = kinematics.travel, kinematics.piston_velocity, kinematics.piston_acceleration
+    travel, velocity, acceleration = (np.asarray(radius * law(*shape)) for law in laws)
+    return travel, -velocity, -acceleration
 
-    radius: float
-    ratio: float
 
-    def at(self, angle: Array | float) -> Array:
-        """Return the travel at a crank angle [m]."""
-        return np.asarray(self.radius * kinematics.travel(np, np.asarray(angle), self.ratio))
-
-    def slope(self, angle: Array | float) -> Array:
-        """Return the derivative by the crank angle [m]."""
-        return np.asarray(-self.radius * kinematics.piston_velocity(np, np.asarray(angle), self.ratio))
-
-    def bend(self, angle: Array | float) -> Array:
-        """Return the second derivative by the crank angle [m]."""
-        return np.asarray(-self.radius * kinematics.piston_acceleration(np, np.asarray(angle), self.ratio))
-
-    @property
-    def maximum(self) -> tuple[float, float, float]:
-        """Upper bounds of the first three derivatives [m]: sums of amplitudes of orders."""
-        orders = np.abs(np.fft.rfft(self.at(math.tau * np.arange(_STEPS) / _STEPS)))[1:] * (2.0 / _STEPS)
-        h = np.arange(1, len(orders) + 1)
-        return float(h @ orders), float(h**2 @ orders), float(h**3 @ orders)
+def _largest_derivatives(radius: float, ratio: float) -> list[float]:
+    # upper bounds of the first three derivatives of the travel [m]: sums of amplitudes of orders
+    travel, _, _ = _travel(radius, ratio, math.tau * np.arange(_STEPS) / _STEPS)
+    orders = np.abs(np.fft.rfft(travel))[1:] * (2.0 / _STEPS)
+    return [float(np.arange(1, len(orders) + 1) ** power @ orders) for power in (1, 2, 3)]
 
 
 def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -> Array:
@@ -78,30 +66,30 @@ def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -
     facing, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
     assert isinstance(facing, Facing)
     count = CELLS * cycle.turns
-    near, ahead = _Travel(part.crank_radius, part.rod_ratio), facing.ahead
-    far = _Travel(facing.crank_radius, facing.crank_radius / facing.rod_length)
+    near, ahead = (part.crank_radius, part.rod_ratio), facing.ahead
+    far = facing.crank_radius, facing.crank_radius / facing.rod_length
     gamma, g = cycle.angle * (np.arange(count) + 0.5) / count, 0.5 * cycle.angle / count
-    (m1, m2, _), (n1, n2, n3) = near.maximum, far.maximum
-    top, bottom = (ratio * angle for angle in chamber.dead_centres)
-    minimum, stroke = (float(near.at(a) + far.at(a + ahead)) for a in (top, bottom))
-    stroke -= minimum
-    first, last = float(far.slope(top + ahead)), float(far.slope(bottom + ahead))
+    (m1, m2, _), (n1, n2, n3) = _largest_derivatives(*near), _largest_derivatives(*far)
+    ends = np.array([ratio * angle for angle in chamber.dead_centres])
+    (top, bottom), (at_near, *_), (at_far, (first, last), _) = ends, _travel(*near, ends), _travel(*far, ends + ahead)
+    minimum, stroke = float(at_near[0] + at_far[0]), float(np.diff(at_near + at_far)[0])
     # both dead centres move by no more than the lead
     grows, loose = last - first, 4.0 * half * n2
     narrow = stroke - half * (abs(grows) + loose)
     if narrow <= 0.0:
         return np.full(count, math.inf)
-    swept = (near.at(gamma) + far.at(gamma + ahead) - minimum) / stroke
-    rate, bend = far.slope(gamma + ahead), far.bend(gamma + ahead)
+    (travel, slope, _), (far_travel, rate, bend) = _travel(*near, gamma), _travel(*far, gamma + ahead)
+    swept = (travel + far_travel - minimum) / stroke
     rough = (half * 4.0 * n1 + g * (m1 + n1)) / narrow
     off = (g + half) * n2 + 2.0 * half * n2 + rough * (abs(grows) + loose) + loose
     moved = (np.abs(rate - first - swept * grows) + off) / narrow
-    opening = np.abs(near.slope(gamma) + rate) + g * (m2 + n2) + half * n2
+    opening = np.abs(slope + rate) + g * (m2 + n2) + half * n2
     wide = half * moved + g * opening / narrow
     small = 1.0 / (gas.compression_ratio - 1.0)
     over, steep = _pressed(gas, cycle, np.maximum(swept - wide, 0.0) + small, swept + wide + small,
                            _strokes(gamma, top, bottom, g + half, cycle))  # fmt: skip
-    return half * part.piston_area * (steep * moved * opening + over * (np.abs(bend) + (g + half) * n3))
+    change = steep * moved * opening + over * (np.abs(bend) + (g + half) * n3)
+    return np.asarray(half * part.piston_area * change)
 
 
 def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycle) -> tuple[NDArray[np.bool_], ...]:

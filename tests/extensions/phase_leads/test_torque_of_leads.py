@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from laufruhe.extensions.phase_leads.irregularity import largest_torque
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.prove.boxes.lead_swing import largest_torque
 
 
 @pytest.mark.parametrize("seed", range(6))

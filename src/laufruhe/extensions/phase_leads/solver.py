@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 
 from laufruhe.errors import ModelError, counted
+from laufruhe.extensions.phase_leads.bounds import SLACK, LeadBound, LeadBoxes
+from laufruhe.extensions.phase_leads.model import PhaseLeadModel, PhaseLeadNorm
+from laufruhe.extensions.phase_leads.shared_gas import SharedGasBoxes
 from laufruhe.load_models.affine import AffineProblem
-from laufruhe.load_models.phase_lead_model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import RotorDrive, real_bounds
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.boxes.leads import SLACK, LeadBound, LeadBoxes
-from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
 from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, bisect_box, halves
 from laufruhe.prove.certificate import Multipliers, ProofStrength, best_bound
 from laufruhe.prove.witness import thin_box
