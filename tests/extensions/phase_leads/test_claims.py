@@ -44,7 +44,7 @@ def test_a_broken_bounder_of_leads_between_shared_chambers(monkeypatch: pytest.M
 @pytest.mark.slow
 def test_without_the_folder_leads_are_decided_without_a_bound(tmp_path: Path) -> None:
     path = PROBLEMS / "geared-three-leads.toml"
-    solved = run(without("phase_leads", tmp_path / "site"), "-c", SOLVED, path)
+    solved = run(without(["phase_leads"], tmp_path / "site"), "-c", SOLVED, path)
     assert solved.returncode == 0, solved.stderr
     value, kind = json.loads(solved.stdout)
     objective = laufruhe.solve(path).objective
