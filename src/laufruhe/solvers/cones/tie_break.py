@@ -17,7 +17,7 @@ from laufruhe.solvers.cones.conic import solve_cones
 SAME_LOAD = 1e-10
 """Relative change of a load that counts as none."""
 NEGLIGIBLE = 1e-6
-"""Relative load of a decision that counts as zero."""
+"""Relative load of a decision, or of a remaining sum of loads, that counts as zero."""
 
 
 def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
@@ -25,7 +25,7 @@ def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
     directions = _free_directions(problem, affine)
     if directions.shape[1]:
         x = _minimise_mass(affine, x, directions)
-    return drop_negligible(affine, x)
+    return _cancel_exactly(affine, drop_negligible(affine, x))
 
 
 def _free_directions(problem: Problem, affine: AffineProblem) -> Array:
@@ -116,6 +116,20 @@ def drop_negligible(affine: AffineProblem, x: Array) -> Array:
         if (is_faint or affine.objective(without) <= affine.objective(x)) and _violates_no_more(affine, x, without):
             x = without
     return x
+
+
+def _cancel_exactly(affine: AffineProblem, x: Array) -> Array:
+    # if the loads cancel, least squares reduce the solver's residual to rounding
+    norms = [norm for _, norm in affine.terms]
+    loads = sum(weight * replace(norm, constant=0.0 * norm.constant).value(x) for weight, norm in affine.terms)
+    if not 0.0 < affine.objective(x) <= NEGLIGIBLE * loads:
+        return x
+    slope = np.concatenate([norm.slope.reshape(-1, affine.size) * affine.units for norm in norms])
+    residual = np.concatenate([norm.rows(x).reshape(-1) for norm in norms])
+    # decisions at zero stay zero
+    exact = project_on_sets(affine, x - affine.units * np.linalg.lstsq(slope * (x != 0.0), residual)[0])
+    is_better = affine.objective(exact) < affine.objective(x) and _violates_no_more(affine, x, exact)
+    return exact if is_better else x
 
 
 def _violates_no_more(affine: AffineProblem, x: Array, candidate: Array) -> bool:
