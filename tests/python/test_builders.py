@@ -59,7 +59,10 @@ def called(node: Any, place: Place) -> Any:
     keys = {name: called(entry, (*place, name)) for name, entry in node.items()}
     arguments = {key: name for name, key in NAMES.items()}
     named = {arguments.get(key, key): entry for key, entry in keys.items() if key != "model"}
-    (made, *_) = [call(**named) for call in table_functions(place) if takes(call, named)]
+    functions = table_functions(place)
+    if not functions:  # a table whose keys are names of the user
+        return keys
+    (made, *_) = [call(**named) for call in functions if takes(call, named)]
     assert made | keys == keys
     return made | keys
 

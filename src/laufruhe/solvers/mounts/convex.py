@@ -180,10 +180,12 @@ class ConvexProgram:
             rows, unit = column(self._matrices), column(np.eye(6)) / self._unit
             for side, edge, sign in sides:
                 if math.isfinite(edge):
-                    constant = sign * (unit * (math.tau * edge) ** 2 - rows[0])
-                    block = Block(MATRIX, constant, -sign * rows[1:], unit, 1.0, np.zeros_like(unit))
+                    # the largest entry is about one, so that a remote limit does not spoil the others
+                    size = max((math.tau * edge) ** 2 / self._unit, 1.0)
+                    constant = sign * (unit * (math.tau * edge) ** 2 - rows[0]) / size
+                    block = Block(MATRIX, constant, -sign * rows[1:] / size, unit, 1.0, np.zeros_like(unit))
                     # rows change by the square of 2 pi f
-                    parts.append((side, block, unit * 2.0 * math.tau**2 * edge))
+                    parts.append((side, block, unit * 2.0 * math.tau**2 * edge / size))
             return parts
         plain = self._block(limit.measure)
         for side, edge, sign in sides:
