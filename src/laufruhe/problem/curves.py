@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_STEPS = 1_000_000
+_PREPOSITIONS = (" on", " at", " of", " in")
 STEPS = 720
 """Default number of samples over the cycle."""
 
@@ -69,6 +70,11 @@ class Field:
     own_axes: tuple[CurveAxis, ...]
     values: Array | ComplexArray
 
+    @property
+    def long_name(self) -> str:
+        """Name with that of its place, such as force on mount."""
+        return f"{self.words} {self.own_axes[0].name}" if self.words.endswith(_PREPOSITIONS) else self.words
+
     def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
         """Yield heading and array index of each table column of the field: one for each combination of its axes."""
         for index in itertools.product(*(range(len(axis.labels)) for axis in self.own_axes)):
@@ -103,7 +109,7 @@ class Fields:
             field.name: (
                 [axis.name for axis in (*shared, *field.own_axes)],
                 field.values,
-                {"units": field.unit or "1", "long_name": field.words},
+                {"units": field.unit or "1", "long_name": field.long_name},
             )
             for field in self.fields
         }

@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.extensions.exchange.components import ExportLoads, plain, speed_text
+from laufruhe.extensions.exchange.components import BLOCK, ExportLoads, plain, speed_text
 
 _SETS, _MEANS, _LOADS = 9_000_000, 9_500_000, 9_100_000
 """Numbers before the first set of frequencies and dynamic loads, of static loads, and of tables and their loads."""
 _NOTES = (
     "displacement coordinate system of the grids: 1 forward, 2 left, 3 up",
     "solve at the frequencies of FREQ alone, not between them",
-    "forces of mounts act on a model of what carries the engine",
+    "LOAD has the means of gas and moving masses, without the weight of the engine",
 )
+_ON_MOUNTS = "forces of mounts act on a model of what carries the engine"
 _TINY, _NOISE = 1e-99, 1e-9
 """Least size of a number that fits into 16 characters, and of an order beside the largest."""
 
@@ -27,11 +28,16 @@ def bulk_data(loads: ExportLoads) -> str:
     components = [c for c in loads.components if c.node and c.quantity != "displacement"]
     units = ", ".join(dict.fromkeys(c.unit for c in components))
     grids = dict.fromkeys(f"grid {c.node}: {c.place}" for c in components)
-    lines = [f"$ {plain(line)}" for line in (*loads.heading(), f"units: {units}, Hz", *_NOTES, *grids)]
+    on_mounts = () if components and components[0].place == BLOCK else (_ON_MOUNTS,)
+    lines = [f"$ {plain(line)}" for line in (*loads.heading(), f"units: {units}, Hz", *_NOTES, *on_mounts, *grids)]
     number = _LOADS
     for k, point in enumerate(loads.points):
         dynamic, static = _SETS + k + 1, _MEANS + k + 1
-        lines.append(f"$ {speed_text(point)}: DLOAD = FREQUENCY = {dynamic}; mean: LOAD = {static}")
+        means: dict[tuple[str, int], list[float]] = {}
+        for c in components:
+            means.setdefault((c.quantity.upper(), c.node), []).append(c.series[k, 0].real)
+        mean = f"mean: LOAD = {static}" if any(map(any, means.values())) else "no mean loads"
+        lines.append(f"$ {speed_text(point)}: DLOAD = FREQUENCY = {dynamic}; {mean}")
         waves = np.array([c.series[k, 1:] for c in components])
         sizes = np.abs(waves).max(axis=0)
         excited = sizes > _NOISE * sizes.max(initial=0.0)
@@ -48,10 +54,7 @@ def bulk_data(loads: ExportLoads) -> str:
                 members += [1.0, number]
         if members:
             lines += [_card("DLOAD", dynamic, 1.0, *members), _card("FREQ", dynamic, *hertz)]
-        means: dict[tuple[str, int], list[float]] = {}
-        for c in components:
-            means.setdefault((c.quantity.upper(), c.node), []).append(c.series[k, 0].real)
-        lines += [_card(name, static, node, None, 1.0, *mean) for (name, node), mean in means.items() if any(mean)]
+        lines += [_card(name, static, node, None, 1.0, *parts) for (name, node), parts in means.items() if any(parts)]
     return "\n".join(lines) + "\n"
 
 

@@ -75,7 +75,9 @@ def write(result: Result, target: str, nodes: Mapping[str, int], highest: float,
     else:
         is_nastran, mounts = target == "nastran", result.final.engine.mounts
         files.write(path, bulk_data(loads) if is_nastran else universal_file(loads, mounts))
-    return f"{counted(len(loads.components), 'component')} of loads, orders to {loads.orders[-1]:g}"
+    written = [c for c in loads.components if c.node] if target in ("uff", "nastran") else loads.components
+    written = [c for c in written if target != "nastran" or c.quantity != "displacement"]
+    return f"{counted(len(written), 'component')} of loads, orders to {loads.orders[-1]:g}"
 
 
 def _write_netcdf(loads: ExportLoads, result: Result, path: Path) -> None:

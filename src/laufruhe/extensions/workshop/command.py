@@ -27,6 +27,7 @@ def drawing(
     What the problem leaves open is decided first. Drawings have dimensions, a title block and a scale.
     """
     with exit_statuses(problem), spoken(quiet, verbose), progress() as say:
+        from laufruhe.cli.check import warn
         from laufruhe.cli.solve import evaluate, solve
         from laufruhe.errors import counted, printed
         from laufruhe.extensions.workshop.drawings import problem_with_bodies, write_drawings
@@ -44,6 +45,7 @@ def drawing(
         with files.staged(files.FileSet(folder, option, "drawing", ())) as stage:
             say("drawing")
             names = write_drawings(result, stage)
+        warn(loaded, problem)
         if not is_quiet():
             sizes = "as in the file" if initial else "of the best design"
             typer.echo(f"{counted(len(names), 'drawing')} {sizes} in {printed(str(folder))}:")
