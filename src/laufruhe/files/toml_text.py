@@ -136,6 +136,8 @@ def toml_complaint(content: bytes, error: tomllib.TOMLDecodeError) -> Complaint:
         remedy = " or ".join([*meant, f"put it in quotes, as in {toml_key(key.group())}"])
     elif known := next((known for start, known in _BY_MESSAGE.items() if message.startswith(start)), None):
         rule, remedy = known
+    elif message == "Invalid value" and "".join(lines[: row - 1]).rstrip().endswith((",", "[")):
+        rule, remedy = "the list before it has no end", "add ]"
     elif message == "Invalid value" and not ahead:
         rule, remedy = "no value follows", "write one, or leave the key out"
     elif message == "Invalid value" and (word := _WORD.match(ahead)):
