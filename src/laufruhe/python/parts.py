@@ -209,8 +209,8 @@ class EngineParts(Parts):
         return self._with("correction", "correction", keys_of(locals()))
 
     def measurement(
-        self, *, file: str, quantity: str | None = None, unit: str | None = None, deviation: Number | None = None,
-        values: Table | None = None,
+        self, *, file: str, quantity: str | None = None, unit: str | None = None,
+        amplitude: Literal["peak", "rms"] | None = None, deviation: Number | None = None, values: Table | None = None,
     ) -> Self:
         """Return the engine with a measurement.
 

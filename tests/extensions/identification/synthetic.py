@@ -117,7 +117,16 @@ def measured(truth: Truth, rng: np.random.Generator, noise: float, orders: tuple
         parts = rng.normal(0.0, deviation, (2, *exact.shape))
         points, columns = zip(*rows, strict=True)
         measurements.append(
-            Measurement(channel.name, truth.problem, channel, points, columns, exact + parts[0] + 1j * parts[1], None)
+            Measurement(
+                channel.name,
+                truth.problem,
+                channel,
+                points,
+                columns,
+                exact + parts[0] + 1j * parts[1],
+                None,
+                tuple((f"{j} x", f"{j} y", f"{j} z") for j in range(exact.shape[1])),
+            )
         )
     return measurements
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.extensions.identification.estimate import estimate
 from laufruhe.extensions.identification.file import MeasurementTable, measurements_of
+from laufruhe.files.complaints import Refused
 from laufruhe.problem.decision import column_bounds, domains_of
 from problem_files import PROBLEMS
 
@@ -67,7 +69,7 @@ def test_two_discs_in_one_plane_cannot_be_told_apart() -> None:
     text = READY.read_text().replace('x = "-190 mm"', 'x = "170 mm"')
     text = text.replace('{ between = ["0.4 kg", "0.8 kg"], start = "0.55 kg" }', '"0.61 kg"')
     text = text.replace('{ between = ["100 N/mm", "600 N/mm"], start = "250 N/mm" }', '"310 N/mm"')
-    problem = lr.load(text)
+    problem = lr.load(text.split("[[measurements]]")[0])
     table = MeasurementTable(file="built-twin-received.csv", quantity="receiver acceleration", deviation="0.15 m/s^2")
     answer = estimate(measurements_of(problem, [table], PROBLEMS))
     assert len(answer.directions) == 2
@@ -120,3 +122,46 @@ def test_a_file_without_measurements_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(InputError, match="measurements: is missing"):
         identified(PROBLEMS / "tractor-single.toml", tmp_path, lambda _: None)
+
+
+def _with_columns(tmp_path: Path, change: Callable[[str], str]) -> Path:
+    for csv in PROBLEMS.glob("built-twin-*.csv"):
+        head, _, rows = csv.read_text().partition("\n")
+        (tmp_path / csv.name).write_text(change(head) + "\n" + rows)
+    shutil.copy(READY, tmp_path)
+    return tmp_path / READY.name
+
+
+def test_a_unit_in_the_headings_counts_and_may_not_contradict(tmp_path: Path) -> None:
+    def values(path: Path, **keys: str) -> float:
+        table = MeasurementTable(file="built-twin-received.csv", quantity="receiver acceleration", **keys)
+        (measurement,) = measurements_of(lr.load(path), [table], path.parent)
+        return float(np.nanmax(np.abs(measurement.values)))
+
+    plain = values(READY)
+    in_mm = _with_columns(tmp_path, lambda head: head.replace("[m/s2]", "[mm/s^2]"))
+    assert values(in_mm) == pytest.approx(1e-3 * plain)
+    assert values(READY, amplitude="rms") == pytest.approx(np.sqrt(2.0) * plain)
+    with pytest.raises(Refused, match="differs from mm/s\\^2 in the headings"):
+        values(in_mm, unit="m/s^2")
+    with pytest.raises(Refused, match="furlong"):
+        values(_with_columns(tmp_path, lambda head: head.replace("[m/s2]", "[furlong]")))
+
+
+def test_unbalances_stay_within_their_size(tmp_path: Path) -> None:
+    # phases of the other sign cannot be explained
+    path = _with_columns(tmp_path, lambda head: head)
+    for csv in tmp_path.glob("*.csv"):
+        head, *rows = csv.read_text().splitlines()
+        cells = [row.split(",") for row in rows]
+        turned = [
+            [f"{-float(c)}" if "phase" in name else c for c, name in zip(row, head.split(","), strict=True)]
+            for row in cells
+        ]
+        csv.write_text("\n".join([head, *(",".join(row) for row in turned)]) + "\n")
+    result = CliRunner().invoke(app, ["identify", str(path), "--out", str(tmp_path / "out"), "--json", "-", "--quiet"])
+    assert result.exit_code == 0, result.output
+    numbers = {row["name"]: row for row in json.loads(result.stdout)["numbers"]}
+    for name in ("crank.pulley.unbalance", "crank.flywheel.unbalance"):
+        assert numbers[name]["estimate"] <= 2e-3 * (1.0 + 1e-9)
+    assert "is not explained" in (tmp_path / "out" / "report.md").read_text()

@@ -22,6 +22,8 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.sets import Value
 
 CONFIDENCE = 0.95
+_AT_EDGE = 1e-6
+"""Distance from a bound, as a share of the range, at which a number is at this bound."""
 _ROUNDS, _SAME = 10, 1e-4
 """Largest number of fits in which unknown deviations are estimated, and relative change that ends them (J2)."""
 _LARGE = 0.1
@@ -50,6 +52,8 @@ class Estimate:
         Standard deviation of real and imaginary parts, by quantity [SI].
     unexplained
         Root mean square of measured less computed amplitudes, as a share of the measured ones, by measurement.
+    residuals
+        Computed less measured amplitudes of each measurement, shape (rows, places, d) [SI]; nan if not measured.
     misfit
         Sum of squares over its expectation, if the deviations are known; None otherwise.
     is_linear
@@ -64,6 +68,7 @@ class Estimate:
     freedom: float
     deviations: dict[str, float]
     unexplained: tuple[float, ...]
+    residuals: tuple[ComplexArray, ...]
     misfit: float | None
     is_linear: bool
 
@@ -139,13 +144,20 @@ def estimate(measurements: Sequence[Measurement], say: Callable[[str], None] = l
     weights = model.weights(deviations)
     jacobian = weights[:, None] * model.jacobian(best, low, high)
     span = high - low
-    at_bounds = (best <= low + 1e-6 * span) | (best >= high - 1e-6 * span)
+    at_bounds = (best <= low + _AT_EDGE * span) | (best >= high - _AT_EDGE * span)
+    for domain in domains:
+        if domain.width > 1:
+            at_bounds[domain.columns] = min(domain.set.margins(best[domain.columns])) <= _AT_EDGE
     covariance, directions = _uncertainty(jacobian, span, at_bounds)
     share = [_rms([part]) / (_rms([m.values[m.mask]]) or 1.0) for part, m in zip(parts, measurements, strict=True)]
+    residuals = []
+    for part, m in zip(parts, measurements, strict=True):
+        residuals.append(np.full(m.values.shape, complex(math.nan, math.nan)))
+        residuals[-1][m.mask] = part
     misfit = float(np.sum((weights * model.residual(best)) ** 2)) / (count - len(low)) if not free else None
     return Estimate(
         domains, best, covariance, at_bounds, directions, math.inf if not free else count - len(low), deviations,
-        tuple(share), misfit, is_linear,
+        tuple(share), tuple(residuals), misfit, is_linear,
     )  # fmt: skip
 
 
@@ -161,8 +173,13 @@ class _Model:
     def __init__(self, measurements: Sequence[Measurement], domains: Sequence[Domain]) -> None:
         self.measurements, self.domains = measurements, domains
 
+    def projected(self, x: Array) -> Array:
+        """Return the nearest columns within the sets of all numbers; bounds of columns are wider than a disc."""
+        return np.concatenate([domain.project(x) for domain in self.domains])
+
     def split(self, x: Array) -> list[ComplexArray]:
-        """Return computed less measured amplitudes of each measurement [SI]."""
+        """Return computed less measured amplitudes of each measurement, at the nearest allowed columns [SI]."""
+        x = self.projected(x)
         values = [value_of(domain, x) for domain in self.domains]
         evaluations: dict[int, Evaluation] = {}
         parts = []
@@ -216,7 +233,7 @@ def _fitted(model: _Model, deviations: dict[str, float], starts: Sequence[Array]
             failure = str(error)
     if not fits:
         raise ModelError(f"has no start that can be computed ({failure}); give other starts")
-    return np.asarray(low + span * min(fits, key=lambda fit: float(fit.cost)).x)
+    return model.projected(low + span * min(fits, key=lambda fit: float(fit.cost)).x)
 
 
 def _starts(domains: Sequence[Domain], low: Array, high: Array, count: int, seed: int) -> list[Array]:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Literal, cast
 
 import numpy as np
 
 from laufruhe import units
-from laufruhe.errors import ModelError
+from laufruhe.errors import Complaint, ModelError
 from laufruhe.extensions.identification.measurement import Measurement
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest, require_distinct, si_value
@@ -31,6 +34,7 @@ class MeasurementTable(Table):
     file: str = f.required("File with one row for each order: order, speed, and the amplitudes by place and direction.")
     quantity: str = f.optional("Load that was measured, such as mount force or receiver acceleration.", "mount force")
     unit: str | None = f.optional("Unit of the amplitudes; by default the SI unit of the quantity.")
+    amplitude: Literal["peak", "rms"] = f.optional("What the amplitudes of the file are.", "peak")
     deviation: str | float | None = f.optional(
         "Standard deviation of the real and the imaginary part of an amplitude; by default it is estimated."
     )
@@ -41,11 +45,13 @@ class MeasurementTable(Table):
 
 def _read(tables: list[MeasurementTable], problem: Problem, context: ExtensionContext) -> Problem:
     # measurements change nothing of the engine; the command reads them
-    del context
     require_distinct([(table.file, table.quantity) for table in tables], "measurements", "measurements are the same")
     for k, table in enumerate(tables, 1):
         _channel(table, f"measurements[{k}]")
-    return problem
+        if not (context.folder / table.file).is_file():
+            raise Refused(f"measurements[{k}].file", table.file, "does not exist", "give a file beside the problem")
+    rule, remedy = "are used by laufruhe identify alone", "remove them to design the engine"
+    return replace(problem, warnings=(*problem.warnings, Complaint("measurements", "", rule, remedy)))
 
 
 def _channel(table: MeasurementTable, where: str) -> LoadChannel:
@@ -75,8 +81,6 @@ def _measurement(problem: Problem, table: MeasurementTable, folder: Path, where:
     channel, at = _channel(table, where), f"{where}.file"
     if not channel.needs.of(problem.engine):
         raise Refused(f"{where}.quantity", table.quantity, f"needs {channel.needs.what}", channel.needs.remedy)
-    unit = channel.unit if table.unit is None else table.unit
-    factor = si_value(f"1 {unit}", channel.unit, f"{where}.unit", table.unit)
     deviation = None if table.deviation is None else si_value(table.deviation, channel.unit, f"{where}.deviation")
     if deviation is not None and deviation <= 0.0:
         raise Refused(f"{where}.deviation", str(table.deviation), "must be more than 0", "leave it out if unknown")
@@ -88,6 +92,7 @@ def _measurement(problem: Problem, table: MeasurementTable, folder: Path, where:
         rule = f"has no headings, no rows, or more than {MAX_ROWS}"
         raise Refused(at, table.file, rule, "write a heading and rows of numbers")
     columns = named_columns(table.file, numbers, at)
+    factor = _unit_factor(table, channel, numbers.names, where) * (math.sqrt(2.0) if table.amplitude == "rms" else 1.0)
     orders = columns.pop("order", None)
     if orders is None or not np.all(orders > 0.0):
         raise Refused(at, table.file, "has no column 'order' with orders above 0", "add it: multiples of crank speed")
@@ -97,7 +102,28 @@ def _measurement(problem: Problem, table: MeasurementTable, folder: Path, where:
         stray = f"has a column '{next(iter(columns))}' of unknown meaning" if columns else "has no amplitude"
         remedy = f"name columns as '{names[-1]} amplitude' and '{names[-1]} phase [deg]', or as real and imaginary"
         raise Refused(at, table.file, stray, remedy)
-    return Measurement(table.file, run, channel, points, tuple(orders.tolist()), factor * values, deviation)
+    directions = values.shape[2]
+    named = tuple(tuple(names[k : k + directions]) for k in range(0, len(names), directions))
+    return Measurement(table.file, run, channel, points, tuple(orders.tolist()), factor * values, deviation, named)
+
+
+def _unit_factor(table: MeasurementTable, channel: LoadChannel, headings: Sequence[str], where: str) -> float:
+    """Return the factor of amplitudes to SI: by the key `unit`, or by the unit that all headings have."""
+    of_loads = [name for name in headings if not re.match(r"\s*(order|speed)\b|.*\bphase\b", name, re.IGNORECASE)]
+    texts = [text for name in of_loads for text in re.findall(r"[\[(](.+?)[\])]", name)]
+    # "m/s2" is "m/s^2"
+    units_of_headings = dict.fromkeys(re.sub(r"(?<=[a-z])([23])$", r"^\1", text.strip()) for text in texts)
+    if len(units_of_headings) > 1:
+        raise Refused(f"{where}.file", table.file, "has headings with several units", "give amplitudes one unit")
+    heading = next(iter(units_of_headings), None)
+    factors = [
+        si_value(f"1 {unit}", channel.unit, f"{where}.{key}", unit)
+        for key, unit in (("unit", table.unit), ("file", heading))
+        if unit is not None
+    ]
+    if len(factors) == 2 and not math.isclose(*factors):
+        raise Refused(f"{where}.unit", table.unit, f"differs from {heading} in the headings", "correct one of them")
+    return factors[0] if factors else 1.0
 
 
 def _points(problem: Problem, speeds: Array | None, rows: int, file: str, where: str) -> tuple[int, ...]:

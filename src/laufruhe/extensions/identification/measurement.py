@@ -32,6 +32,8 @@ class Measurement:
         Complex amplitudes c of Re c e^{i k phi}, shape (rows, places, d) [SI]; nan if not measured (C8).
     deviation
         Standard deviation of real and imaginary parts [SI]; None if it is unknown.
+    column_names
+        Name of each place with its direction, as in headings, shape (places, d).
     """
 
     name: str
@@ -41,6 +43,7 @@ class Measurement:
     orders: tuple[float, ...]
     values: ComplexArray
     deviation: float | None
+    column_names: tuple[tuple[str, ...], ...]
 
     @cached_property
     def mask(self) -> NDArray[np.bool_]:

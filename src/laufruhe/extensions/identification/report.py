@@ -30,6 +30,8 @@ from laufruhe.units import readable, shown_in
 
 NUMBERS, IDENTIFIED = "estimates.csv", "identified.toml"
 NAMES = (files.REPORT, files.PAGE, files.RESULT, NUMBERS, IDENTIFIED)
+_MUCH = 0.1
+"""Unexplained share above which the report warns."""
 _NAMED = 0.1
 """Least part of a direction for a number to be named with it."""
 
@@ -77,7 +79,9 @@ def with_estimates(problem: Problem, answer: Estimate) -> Problem:
         # a turn of an unbalance is as large an error as this size across it
         deviation = max(parts[0][1], size * parts[-1][1]) if domain.width == 2 else parts[0][1]
         text = f"{size!r} {unit}".strip()
-        if has_tolerances and math.isfinite(deviation) and not np.any(answer.at_bounds[domain.columns]):
+        # a tolerance of the whole size has no meaning
+        is_known = 3.0 * deviation < abs(size) and not np.any(answer.at_bounds[domain.columns])
+        if has_tolerances and is_known:
             text = f"{text} ± {3.0 * deviation:.3g} {unit}".strip() + " normal batch"
         problem = problem.with_values({name: text}) if domain.width == 2 else problem.fix(name, text)
     return problem
@@ -101,6 +105,12 @@ def _blocks(problem: Problem, measurements: Sequence[Measurement], answer: Estim
         )
     yield Heading("What the numbers explain")
     yield _measurement_table(measurements, answer)
+    if (worst := max(answer.unexplained)) > _MUCH:
+        yield Paragraph(
+            f"{number(100.0 * worst, 3)} % of a measurement is not explained. Check quantity, unit, rms or peak, the "
+            "sense of the phase, places and speeds, or open another number. Until then the intervals have no meaning."
+        )
+    yield _place_table(measurements, answer)
     if answer.misfit is not None:
         yield Paragraph(_misfit(answer.misfit))
     yield Heading("Reproduce")
@@ -177,6 +187,17 @@ def _measurement_table(measurements: Sequence[Measurement], answer: Estimate) ->
     head = ("file", "quantity", "amplitudes", "deviation", "unit", "unexplained [%]")
     note = "Deviation of the real and of the imaginary part. Unexplained: root mean square of measured less computed."
     return Table(head, rows, left=(0, 1, 4), note=note)
+
+
+def _place_table(measurements: Sequence[Measurement], answer: Estimate) -> Table:
+    rows = []
+    for m, rest in zip(measurements, answer.residuals, strict=True):
+        unit, factor = readable(m.channel.unit)
+        for j, i in zip(*np.nonzero(m.mask.any(axis=0)), strict=True):
+            sizes = [float(np.sqrt(np.nanmean(np.abs(part[:, j, i]) ** 2))) for part in (m.values, rest)]
+            rows.append((m.name, m.column_names[j][i], number(factor * sizes[0]), number(factor * sizes[1]), unit))
+    head = ("file", "place and direction", "measured", "unexplained", "unit")
+    return Table(head, rows, left=(0, 1, 4), note="Root mean square over the rows of the file.")
 
 
 def as_json(problem: Problem, measurements: Sequence[Measurement], answer: Estimate) -> str:
