@@ -232,7 +232,8 @@ class Result(ResultContent):
     def harmonics(self) -> xr.Dataset:
         """Return the complex coefficients c of loads and mount displacements by order and direction [xarray].
 
-        At crank angle phi the load is Re sum c e^{i h phi}: |c| is the amplitude of order h, arg c its phase (C8).
+        At crank angle phi the load is Re sum c e^{i h phi}. Absolute value and angle of c are the amplitude of order h
+        and its phase (C8).
         """
         return harmonics_of(self._with_loads).dataset()
 
