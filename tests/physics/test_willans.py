@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -269,3 +270,17 @@ def test_the_line_is_drawn_down_to_no_fuel(tmp_path: Path) -> None:
         drawn = willans.figure(result)
         assert faults_of(drawn, result.problem.title) == []
     assert not willans.applies(laufruhe.evaluate(loaded(tmp_path, changed(BRAKE, own, '[friction]\nfmep = "2 bar"\n'))))
+
+
+def test_a_mean_pressure_of_the_engine_is_needed_by_points_without_a_load_alone() -> None:
+    tables = tomllib.loads((PROBLEMS / "car-four-willans.toml").read_text(encoding="utf-8"))
+    points = [{"speed": "800 rpm", "brake_torque": "10 N m", "name": "idle"}, {"speed": "3000 rpm", "imep": "8 bar"}]
+    tables |= {"operating_points": points, "friction": {"fmep": "0.9 bar", "deviation": "0 bar"}}
+    tables.pop("objective"), tables.pop("constraints", None)
+    whole = laufruhe.evaluate(laufruhe.load(tables))
+    del tables["gas"]["imep"]
+    without = laufruhe.evaluate(laufruhe.load(tables))
+    assert without.objective.value == whole.objective.value
+    del points[1]["imep"]
+    with pytest.raises(InputError, match=r"gas\.imep: is missing; add it, or give operating_points\[2\] imep"):
+        laufruhe.load(tables)

@@ -125,7 +125,9 @@ class SeiligerTable(ChargeTable, FiredTable):
     makes: ClassVar = Seiliger
     model: Literal["seiliger"]
     peak_pressure: f.PositivePressure
-    imep: f.Pressure
+    imep: f.Pressure | None = f.optional(
+        "Indicated mean effective pressure; needed unless every operating point has a load of its own."
+    )
     compression_exponent: f.Positive | None = None
     expansion_exponent: f.Positive | None = None
 
@@ -135,7 +137,9 @@ class WiebeTable(ChargeTable, FiredTable):
 
     makes: ClassVar = Wiebe
     model: Literal["wiebe"]
-    imep: f.Pressure
+    imep: f.Pressure | None = f.optional(
+        "Indicated mean effective pressure; needed unless every operating point has a load of its own."
+    )
     start: f.Angle
     duration: f.Angle
     shape: f.NonNegative | None = None

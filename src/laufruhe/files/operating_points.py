@@ -16,8 +16,10 @@ from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, 
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.cylinder_states import StateTable, cylinder_states
 from laufruhe.files.fields import Name, Table
+from laufruhe.files.gas import GasTable, SeiligerTable, WiebeTable
 from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases
+from laufruhe.machine.gas import AMBIENT_PRESSURE
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
@@ -140,6 +142,21 @@ class Brake:
                 rule = f"has {len(readings)} rows at {speed_text}, the speed of {where}, and a fit needs {FEWEST}"
                 raise Refused("friction.file", self.table.file, rule, "measure more loads at this speed")
             return willans_friction([row[1] for row in readings], [row[2] for row in readings])
+
+
+def with_load(table: GasTable | None, points: Sequence[OperatingPointTable]) -> GasTable | None:
+    """Return the gas with a mean pressure; one that is not given is never used, because all points have a load."""
+    if not isinstance(table, SeiligerTable | WiebeTable) or table.imep is not None:
+        return table
+    without = [k for k, p in enumerate(points, 1)
+               if p.gas and not p.motored and p.imep is None and p.bmep is None and p.brake_torque is None]  # fmt: skip
+    if without:
+        remedy = f"add it, or give operating_points[{without[0]}] imep, bmep or brake_torque"
+        raise Refused("gas.imep", None, "is missing", remedy)
+    if any(row.imep is not None for row in table.single_cylinders):
+        remedy = "add it: cylinders keep their ratio to it"
+        raise Refused("gas.imep", None, "is missing beside an imep of single cylinders", remedy)
+    return table.model_copy(update={"imep": AMBIENT_PRESSURE})
 
 
 def operating_points(

@@ -40,7 +40,7 @@ from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import axes_sentences, load_cases_of, mounts_of
 from laufruhe.files.nested import at, example_at, plain, walk, with_value_at
 from laufruhe.files.numbering import REVERSED, sense_of
-from laufruhe.files.operating_points import Brake, operating_points
+from laufruhe.files.operating_points import Brake, operating_points, with_load
 from laufruhe.files.phasing import is_open, open_phasing
 from laufruhe.files.problem_file import EXTENSION_KEYS, WEIGHT_KEYS, ExtensionContext, Note, ProblemFile, file_model
 from laufruhe.files.quantities import with_followers
@@ -324,7 +324,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent, is_mirrored), cycle_of(table)
     wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
-    gas = gas_of(file.gas, path.parent, cycle, cylinders)
+    gas = gas_of(with_load(file.gas, file.operating_points), path.parent, cycle, cylinders)
     points = operating_points(file.operating_points, gas, cycle, table.stroke, brake, cylinders)
     if without_gas:
         points = tuple(replace(point, gas=None) for point in points)

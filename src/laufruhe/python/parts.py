@@ -51,21 +51,21 @@ class EngineParts(Parts):
         return self._with("operating_points", "operating_point", keys_of(locals()))
 
     def gas_seiliger(
-        self, *, peak_pressure: Value, imep: Value, single_cylinders: Sequence[Table] | None = None,
+        self, *, peak_pressure: Value, single_cylinders: Sequence[Table] | None = None,
         chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
         intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
-        crankcase_pressure: Value | None = None, compression_exponent: Value | None = None,
+        crankcase_pressure: Value | None = None, imep: Value | None = None, compression_exponent: Value | None = None,
         expansion_exponent: Value | None = None,
     ) -> Self:
         """Return the engine with gas seiliger. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_seiliger", keys_of(locals(), {'model': 'seiliger'}))
 
     def gas_wiebe(
-        self, *, imep: Value, start: Value, duration: Value, single_cylinders: Sequence[Table] | None = None,
+        self, *, start: Value, duration: Value, single_cylinders: Sequence[Table] | None = None,
         chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
         intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
-        crankcase_pressure: Value | None = None, shape: Value | None = None, completeness: Value | None = None,
-        heat_ratio: Value | None = None,
+        crankcase_pressure: Value | None = None, imep: Value | None = None, shape: Value | None = None,
+        completeness: Value | None = None, heat_ratio: Value | None = None,
     ) -> Self:
         """Return the engine with gas wiebe. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_wiebe", keys_of(locals(), {'model': 'wiebe'}))
