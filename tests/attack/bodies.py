@@ -81,7 +81,9 @@ def part_of(rng: np.random.Generator) -> SliderCrank:
 def by_shapely(part: SliderCrank, case: Crankcase, body: Body, seat: Seat, angles: Array) -> dict[str, float]:
     """Return the least distances at some crank angles, with the slider-crank written out anew."""
     rod, skirt = case.rod, case.skirt
-    assert rod is not None and skirt is not None and seat.angle is not None  # noqa: PT018
+    assert rod is not None
+    assert skirt is not None
+    assert seat.angle is not None
     turn = part.throw + angles - part.bank
     pin = part.crank_radius * np.exp(1j * turn)
     up = pin.real + np.sqrt(part.rod_length**2 - (pin.imag - part.offset) ** 2)

@@ -290,7 +290,7 @@ def test_pictures_come_in_the_format_asked_for(here: Path, kind: str, ends: set[
 @pytest.mark.slow
 @pytest.mark.parametrize(("more", "lines"), [([], 1), (["-q"], 0)])
 def test_letters_that_cannot_be_drawn_are_told_in_one_line(more: list[str], lines: int, tmp_path: Path) -> None:
-    """By a process that draws with no backend and no settings of others, once; next to no font has Linear A."""
+    """Draw once in a process without a backend and with broken settings; hardly any font has Linear A."""
     (tmp_path / "matplotlibrc").write_bytes(b"font.size: nonsense\n\xff\xfe\n")
     path = written(tmp_path, scenes.SHAKING_ONLY.replace('title = "', 'title = "\U00010600 '))
     words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", str(tmp_path / "out"), *more]

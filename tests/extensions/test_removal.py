@@ -106,7 +106,7 @@ def test_every_home_is_there() -> None:
 
 
 def test_nothing_imports_an_extension_of_others_as_it_is_imported() -> None:
-    """So a copy without one imports as the copy without all of them does."""
+    """A copy without one extension then imports as the copy without all of them does."""
     for path in SOURCE.rglob("*.py"):
         room, own, *_ = [*path.relative_to(SOURCE).parts, ""]
         names = re.findall(

@@ -97,7 +97,7 @@ def test_orders_are_those_of_the_curves(result: Result, folder: Path) -> None:
 
 
 def test_components_by_order_make_the_curves(result: Result, folder: Path) -> None:
-    """Each curve is the sum of its orders: amplitude times cosine of order times angle plus phase."""
+    """Compare each curve with the sum of its orders: amplitude times cosine of order times angle plus phase."""
     curves, orders = (pd.read_csv(folder / f"{name}.csv") for name in ("forces", "orders"))
     for point in result.problem.points:
         curve, rows = (table[table["point"] == point.name] for table in (curves, orders))

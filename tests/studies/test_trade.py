@@ -100,7 +100,7 @@ def test_an_open_flywheel_is_refused_before_anything_is_measured(tmp_path: Path)
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_trade")
 def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of several problems; the rest is an error that counts them."""
+    """Measure two problems, of which one runs out of time: an error counts it."""
     quick, never = PROBLEMS / "boxer-four.toml", PROBLEMS / "inline-five.toml"
 
     def out_of_time(problem: Problem, *_: object) -> Trade:

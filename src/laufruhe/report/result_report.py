@@ -8,7 +8,7 @@ from laufruhe.present.pictures import PICTURES
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
 from laufruhe.report.inputs import input_tables
 from laufruhe.report.sections import tables_of
-from laufruhe.report.strict_json import versions
+from laufruhe.report.strict_json import made_with
 from laufruhe.report.wording import details, explained, fidelity_of, headline
 from laufruhe.solvers.result import Result
 
@@ -42,5 +42,4 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
     if problem.origin is not None:
         yield Paragraph("The problem file:")
         yield Code(problem.to_toml().rstrip(), "toml")
-    version_list = ", ".join(f"{name} {version}" for name, version in versions().items())
-    yield Paragraph(f"Made with {version_list}.", marked=True)
+    yield Paragraph(made_with(), marked=True)

@@ -28,6 +28,11 @@ def versions() -> dict[str, str]:
     return {"laufruhe": __version__, **library_versions()}
 
 
+def made_with() -> str:
+    """Return the sentence of reports that names these versions."""
+    return "Made with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + "."
+
+
 def is_ours(path: Path) -> bool:
     """Return True if a file may be overwritten: it is empty, or begins as files of this package do."""
     with suppress(OSError), path.open("rb") as stream:

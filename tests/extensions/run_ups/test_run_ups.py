@@ -33,7 +33,7 @@ def soft() -> str:
 
 @pytest.mark.slow
 def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
-    """Where the best design without it keeps it, that stays proven."""
+    """The best design without a run-up stays proven if it keeps the limit of the run-up."""
     soft += "[search]\nstarts = 1\n"
     alone = laufruhe.solve(loaded(tmp_path, soft))
     kept = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))

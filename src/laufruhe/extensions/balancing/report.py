@@ -25,7 +25,7 @@ from laufruhe.present.tables import Table
 from laufruhe.report import files
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
 from laufruhe.report.screen import show_document
-from laufruhe.report.strict_json import strict, versions
+from laufruhe.report.strict_json import made_with, strict, versions
 from laufruhe.report.table_files import write_csv
 from laufruhe.report.web_page import as_html
 from laufruhe.units import readable, shown_in
@@ -127,7 +127,7 @@ def _blocks(job: Job, answer: Balanced | None, command: str) -> Iterator[Block]:
         yield sheet
     yield Heading("Reproduce")
     yield Code(command)
-    yield Paragraph("Made with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".")
+    yield Paragraph(made_with())
 
 
 def headline(answer: Balanced) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.special import stdtrit
+from scipy.special import ndtri, stdtrit
 from scipy.stats import qmc
 
 from laufruhe.errors import ModelError
@@ -26,7 +26,7 @@ _AT_EDGE = 1e-6
 """Distance from a bound, as a share of the range, at which a number is at this bound."""
 _ROUNDS, _SAME = 10, 1e-4
 """Largest number of fits in which unknown deviations are estimated, and relative change that ends them (J2)."""
-_LARGE = 0.1
+LARGE = 0.1
 """Least part of a direction for a number to be named with it."""
 
 
@@ -76,7 +76,7 @@ class Estimate:
     def half_width(self) -> float:
         """Half-width of a confidence interval in standard deviations."""
         if math.isinf(self.freedom):
-            return float(-stdtrit(1e9, 0.5 - 0.5 * CONFIDENCE))
+            return float(ndtri(0.5 + 0.5 * CONFIDENCE))
         return float(stdtrit(self.freedom, 0.5 + 0.5 * CONFIDENCE))
 
     def polar(self, domain: Domain) -> tuple[tuple[float, float], ...]:
@@ -149,15 +149,15 @@ def estimate(measurements: Sequence[Measurement], say: Callable[[str], None] = l
         if domain.width > 1:
             at_bounds[domain.columns] = min(domain.set.margins(best[domain.columns])) <= _AT_EDGE
     covariance, directions = _uncertainty(jacobian, span, at_bounds)
-    share = [_rms([part]) / (_rms([m.values[m.mask]]) or 1.0) for part, m in zip(parts, measurements, strict=True)]
+    shares = [_rms([part]) / (_rms([m.values[m.mask]]) or 1.0) for part, m in zip(parts, measurements, strict=True)]
     residuals = []
     for part, m in zip(parts, measurements, strict=True):
         residuals.append(np.full(m.values.shape, complex(math.nan, math.nan)))
         residuals[-1][m.mask] = part
-    misfit = float(np.sum((weights * model.residual(best)) ** 2)) / (count - len(low)) if not free else None
+    misfit = float(np.sum((weights * stacked(parts)) ** 2)) / (count - len(low)) if not free else None
     return Estimate(
         domains, best, covariance, at_bounds, directions, math.inf if not free else count - len(low), deviations,
-        tuple(share), tuple(residuals), misfit, is_linear,
+        tuple(shares), tuple(residuals), misfit, is_linear,
     )  # fmt: skip
 
 
@@ -165,6 +165,11 @@ def value_of(domain: Domain, x: Array) -> Value:
     """Return the value of a number from all columns; real, unless it is an unbalance."""
     value = domain.complex_value(x)
     return value if domain.decision.rotor_drives else value.real
+
+
+def stacked(parts: Sequence[ComplexArray]) -> Array:
+    """Return real and imaginary parts of all measurements, one after the other."""
+    return np.concatenate([part for c in parts for part in (c.real, c.imag)])
 
 
 class _Model:
@@ -190,7 +195,7 @@ class _Model:
         return parts
 
     def residual(self, x: Array) -> Array:
-        return np.concatenate([part for c in self.split(x) for part in (c.real, c.imag)])
+        return stacked(self.split(x))
 
     def weights(self, deviations: dict[str, float]) -> Array:
         """Return the inverse of the deviation of each residual [1/SI]."""
@@ -255,7 +260,7 @@ def _uncertainty(jacobian: Array, span: Array, at_bounds: NDArray[np.bool_]) -> 
     known = rows[~weak] / np.maximum(sizes[~weak, None], 1e-300)
     block = known.T @ known * np.outer(span[inside], span[inside])
     # a number with a part in an undetermined direction has no finite deviation
-    lost = np.any(np.abs(rows[weak]) > _LARGE, axis=0)
+    lost = np.any(np.abs(rows[weak]) > LARGE, axis=0)
     block[lost, :], block[:, lost] = 0.0, 0.0
     block[lost, lost] = math.inf
     covariance[np.ix_(inside, inside)] = block

@@ -12,7 +12,7 @@ import numpy as np
 from laufruhe.cli.screen import Output, typed
 from laufruhe.errors import refused
 from laufruhe.extension import extensions
-from laufruhe.extensions.identification.estimate import CONFIDENCE, Estimate, estimate
+from laufruhe.extensions.identification.estimate import CONFIDENCE, LARGE, Estimate, estimate
 from laufruhe.extensions.identification.file import MEASUREMENTS, MeasurementTable, measurements_of
 from laufruhe.extensions.identification.measurement import Measurement
 from laufruhe.files.complaints import errors_in_file
@@ -23,7 +23,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report import files
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Paragraph
 from laufruhe.report.screen import show_document
-from laufruhe.report.strict_json import strict, versions
+from laufruhe.report.strict_json import made_with, strict, versions
 from laufruhe.report.table_files import write_csv
 from laufruhe.report.web_page import as_html
 from laufruhe.units import readable, shown_in
@@ -32,8 +32,6 @@ NUMBERS, IDENTIFIED = "estimates.csv", "identified.toml"
 NAMES = (files.REPORT, files.PAGE, files.RESULT, NUMBERS, IDENTIFIED)
 _MUCH = 0.1
 """Unexplained share above which the report warns."""
-_NAMED = 0.1
-"""Least part of a direction for a number to be named with it."""
 
 
 def identified(path: Path, out: Path | None, say: Callable[[str], None]) -> tuple[Output, Callable[[], str]]:
@@ -115,7 +113,7 @@ def _blocks(problem: Problem, measurements: Sequence[Measurement], answer: Estim
         yield Paragraph(_misfit(answer.misfit))
     yield Heading("Reproduce")
     yield Code(typed("laufruhe", "identify", path))
-    yield Paragraph("Made with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".")
+    yield Paragraph(made_with())
 
 
 def _minimum(answer: Estimate) -> str:
@@ -145,7 +143,7 @@ def _column_names(answer: Estimate) -> list[str]:
 
 
 def _direction(row: np.ndarray[Any, Any], names: Sequence[str]) -> str:
-    parts = [(share, name) for share, name in zip(row, names, strict=True) if abs(share) > _NAMED]
+    parts = [(share, name) for share, name in zip(row, names, strict=True) if abs(share) > LARGE]
     if len(parts) == 1:
         return f"{parts[0][1]} alone"
     sign = math.copysign(1.0, parts[0][0])
