@@ -66,7 +66,8 @@ def _box(x: float, y: float, width: float, height: float, fill: str) -> str:
 def drawing() -> str:
     """Return the picture as SVG."""
     stack, beside = rooms(), extensions()
-    height = TOP + ROW * len(stack) + 50
+    # words stand below both columns
+    height = TOP + max(ROW * len(stack) + 50, ROW * len(beside) + 68)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1090 {height}" width="1090" height="{height}" '
         'font-family="sans-serif" role="img" aria-label="Rooms of the core, a decision on its way, and extensions">',
@@ -99,7 +100,7 @@ def drawing() -> str:
     ):
         parts.append(_text(BESIDE, y, words, 13, "#33475a"))
         y += 18
-    parts.append(_text(LEFT, height - 18, "Imports point down only.", 13, "#33475a"))
+    parts.append(_text(LEFT, TOP + ROW * len(stack) + 32, "Imports point down only.", 13, "#33475a"))
     return "\n".join([*parts, "</svg>", ""])
 
 
