@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,25 @@ def test_open_unbalances_are_a_linear_least_squares_problem() -> None:
     )
     assert answer.is_linear
     assert answer.values == pytest.approx(0.5 * (low + high) + shift.x, abs=1e-5 * float(np.max(high)))
+
+
+def test_a_stated_deviation_belongs_to_its_file() -> None:
+    # true orders, and the same with 30 % of error and a deviation a hundred times as large, in both orders of files
+    truth = engine(4, linear=True)
+    right = [
+        replace(m, deviation=0.01 * float(np.nanmax(np.abs(m.values))))
+        for m in measured(truth, np.random.default_rng(1), 0.001)
+    ]
+    exact = estimate(right).values
+    for is_stated in (True, False):
+        wrong = [replace(m, values=1.3 * m.values, deviation=100.0 * (m.deviation or 0.0)) for m in right]
+        if not is_stated:
+            wrong = [replace(m, deviation=None) for m in wrong]
+        answers = [estimate([*a, *b]) for a, b in ((right, wrong), (wrong, right))]
+        assert answers[0].values == pytest.approx(answers[1].values, rel=1e-6, abs=1e-9)
+        assert sorted(answers[0].deviations) == pytest.approx(sorted(answers[1].deviations), rel=1e-6)
+        assert np.isinf(answers[0].freedom) == is_stated
+        assert answers[0].values == pytest.approx(exact, abs=2e-2 * float(np.max(np.abs(exact))))
 
 
 @pytest.mark.slow

@@ -49,7 +49,7 @@ class Estimate:
     freedom
         Degrees of freedom of the deviations; infinite if these are known.
     deviations
-        Standard deviation of real and imaginary parts, by quantity [SI].
+        Standard deviation of real and imaginary parts, by measurement [SI].
     unexplained
         Root mean square of measured less computed amplitudes, as a share of the measured ones, by measurement.
     residuals
@@ -66,7 +66,7 @@ class Estimate:
     at_bounds: NDArray[np.bool_]
     directions: Array
     freedom: float
-    deviations: dict[str, float]
+    deviations: tuple[float, ...]
     unexplained: tuple[float, ...]
     residuals: tuple[ComplexArray, ...]
     misfit: float | None
@@ -117,16 +117,18 @@ def estimate(measurements: Sequence[Measurement], say: Callable[[str], None] = l
         raise ModelError("has no open number to estimate; write for example unbalance = { between = [...] }")
     low, high = column_bounds(domains)
     count = 2 * sum(int(m.mask.sum()) for m in measurements)
-    known = all(m.deviation is not None for m in measurements)
-    if count < len(low) + (not known):
+    # files of one quantity that state no deviation share an estimated one (J2)
+    unstated = {
+        name: [k for k, m in enumerate(measurements) if m.channel.name == name and m.deviation is None]
+        for name in dict.fromkeys(m.channel.name for m in measurements if m.deviation is None)
+    }
+    if count < len(low) + bool(unstated):
         raise ModelError(
             f"has {count} measured numbers for {len(low)} open ones; measure more orders, or open fewer numbers"
         )
-    quantities = [m.channel.name for m in measurements]
-    scales = {name: _rms([m.values[m.mask] for m in measurements if m.channel.name == name]) for name in quantities}
-    deviations = {m.channel.name: m.deviation or 0.01 * scales[m.channel.name] or 1.0 for m in measurements}
-    free = [name for name in dict.fromkeys(quantities) if all(m.deviation is None for m in measurements
-                                                              if m.channel.name == name)]  # fmt: skip
+    deviations = np.array([m.deviation or 0.0 for m in measurements])
+    for members in unstated.values():
+        deviations[members] = 0.01 * _rms([measurements[k].values[measurements[k].mask] for k in members]) or 1.0
     is_linear = all(decision.is_affine for decision in problem.decisions)
     starts = _starts(domains, low, high, 1 if is_linear else problem.search.starts, problem.search.seed)
     model = _Model(measurements, domains)
@@ -134,12 +136,11 @@ def estimate(measurements: Sequence[Measurement], say: Callable[[str], None] = l
     best, spare = starts[0], 1.0 - len(low) / count
     for _ in range(_ROUNDS):
         best = _fitted(model, deviations, starts, low, high)
-        starts, before = [best], dict(deviations)
+        starts, before = [best], deviations.copy()
         parts = model.split(best)
-        for name in free:
-            residuals = [part for part, quantity in zip(parts, quantities, strict=True) if quantity == name]
-            deviations[name] = _rms(residuals) / math.sqrt(2.0 * spare) or deviations[name]
-        if all(math.isclose(deviations[name], before[name], rel_tol=_SAME) for name in free):
+        for members in unstated.values():
+            deviations[members] = _rms([parts[k] for k in members]) / math.sqrt(2.0 * spare) or deviations[members]
+        if np.allclose(deviations, before, rtol=_SAME, atol=0.0):
             break
     weights = model.weights(deviations)
     jacobian = weights[:, None] * model.jacobian(best, low, high)
@@ -154,10 +155,11 @@ def estimate(measurements: Sequence[Measurement], say: Callable[[str], None] = l
     for part, m in zip(parts, measurements, strict=True):
         residuals.append(np.full(m.values.shape, complex(math.nan, math.nan)))
         residuals[-1][m.mask] = part
-    misfit = float(np.sum((weights * stacked(parts)) ** 2)) / (count - len(low)) if not free else None
+    misfit = float(np.sum((weights * stacked(parts)) ** 2)) / (count - len(low)) if not unstated else None
+    estimated = 2 * sum(int(measurements[k].mask.sum()) for members in unstated.values() for k in members)
     return Estimate(
-        domains, best, covariance, at_bounds, directions, math.inf if not free else count - len(low), deviations,
-        tuple(shares), tuple(residuals), misfit, is_linear,
+        domains, best, covariance, at_bounds, directions, spare * estimated if unstated else math.inf,
+        tuple(deviations.tolist()), tuple(shares), tuple(residuals), misfit, is_linear,
     )  # fmt: skip
 
 
@@ -197,11 +199,9 @@ class _Model:
     def residual(self, x: Array) -> Array:
         return stacked(self.split(x))
 
-    def weights(self, deviations: dict[str, float]) -> Array:
+    def weights(self, deviations: Sequence[float] | Array) -> Array:
         """Return the inverse of the deviation of each residual [1/SI]."""
-        return np.concatenate(
-            [np.full(2 * int(m.mask.sum()), 1.0 / deviations[m.channel.name]) for m in self.measurements]
-        )
+        return np.repeat(1.0 / np.asarray(deviations), [2 * int(m.mask.sum()) for m in self.measurements])
 
     def jacobian(self, x: Array, low: Array, high: Array) -> Array:
         """Return central differences, within the bounds, shape (rows, columns)."""
@@ -214,7 +214,7 @@ class _Model:
         return np.column_stack(columns)
 
 
-def _fitted(model: _Model, deviations: dict[str, float], starts: Sequence[Array], low: Array, high: Array) -> Array:
+def _fitted(model: _Model, deviations: Array, starts: Sequence[Array], low: Array, high: Array) -> Array:
     """Return the columns with the least squares of all starts."""
     span = high - low
     weights = model.weights(deviations)

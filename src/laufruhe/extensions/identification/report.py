@@ -118,7 +118,7 @@ def _blocks(problem: Problem, measurements: Sequence[Measurement], answer: Estim
 
 def _minimum(answer: Estimate) -> str:
     share = f"{CONFIDENCE:.0%}".replace("%", " %")
-    noise = "the deviation of the file" if math.isinf(answer.freedom) else "the deviation of what is unexplained"
+    noise = "the stated deviations" if math.isinf(answer.freedom) else "the deviation of what is unexplained"
     single = (
         "All open numbers act linearly, so the least squares have one minimum."
         if answer.is_linear
@@ -177,9 +177,9 @@ def _table(answer: Estimate, *, is_readable: bool) -> Table:
 
 def _measurement_table(measurements: Sequence[Measurement], answer: Estimate) -> Table:
     rows = [
-        (m.name, m.channel.name, f"{int(m.mask.sum())}", number(factor * answer.deviations[m.channel.name]), unit,
+        (m.name, m.channel.name, f"{int(m.mask.sum())}", number(factor * deviation), unit,
          number(100.0 * share, 3))
-        for m, share in zip(measurements, answer.unexplained, strict=True)
+        for m, deviation, share in zip(measurements, answer.deviations, answer.unexplained, strict=True)
         for unit, factor in (readable(m.channel.unit),)
     ]  # fmt: skip
     head = ("file", "quantity", "amplitudes", "deviation", "unit", "unexplained [%]")
@@ -214,8 +214,8 @@ def as_json(problem: Problem, measurements: Sequence[Measurement], answer: Estim
         "undetermined": answer.directions.tolist(),
         "measurements": [
             {"file": m.name, "quantity": m.channel.name, "amplitudes": int(m.mask.sum()),
-             "deviation": answer.deviations[m.channel.name], "unexplained": share}
-            for m, share in zip(measurements, answer.unexplained, strict=True)
+             "deviation": deviation, "unexplained": share}
+            for m, deviation, share in zip(measurements, answer.deviations, answer.unexplained, strict=True)
         ],
         "misfit": answer.misfit,
         "linear": answer.is_linear,
