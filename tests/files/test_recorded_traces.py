@@ -541,7 +541,7 @@ def test_check_solve_and_json_say_how_the_file_was_read(tmp_path: Path) -> None:
     assert lines[0].startswith("ok: scene, 1 cylinder")
     assert "gas: Of 8 cycles, with peaks of 55.09 bar and a standard deviation of 2.14 bar, the mean is used." in lines
     assert lines[-1].startswith(
-        "gas at 1500 rpm: peak 55.08 bar at 12 deg, imep 4.915 bar, mean torque 15.73 N m, power 2.47 kW"
+        "gas at 1500 rpm: peak 55.08 bar at 12 deg, imep 4.915 bar, gas torque 15.73 N m, power 2.47 kW"
     )
     solved = run("solve", path, "--out", tmp_path / "out", "--json", tmp_path / "r.json")
     assert solved.exit_code == 0, solved.output

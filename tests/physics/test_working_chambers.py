@@ -27,6 +27,7 @@ from laufruhe.machine import (
     Steam,
 )
 from laufruhe.physics.bearing_loads import piston_pin_forces
+from laufruhe.physics.gas_facts import cylinder_facts
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
@@ -284,6 +285,14 @@ def test_equal_pistons_of_the_ready_compressor_leave_no_first_order() -> None:
     # two stages of about the same work
     work = -loads[0, 3].real * math.tau
     assert work == pytest.approx(110.2 + 114.1, rel=1e-3)
+    # figures of each stage
+    stages = dict(cylinder_facts(problem.engine, problem.points[0]))
+    assert [stage.split(", ")[1] for stage in stages] == ["first stage", "second stage"]
+    assert [-facts.torque * math.tau for facts in stages.values()] == pytest.approx([110.2, 114.1], rel=1e-3)
+    for facts, bore, peak in zip(stages.values(), (0.12, 0.07), (3.2e5, 10e5), strict=True):
+        assert facts.displacement == pytest.approx(math.pi / 4.0 * bore**2 * 0.08, rel=1e-12)
+        assert facts.imep * facts.displacement == pytest.approx(facts.torque * math.tau, rel=1e-12)
+        assert (facts.peak_pressure, facts.power) == pytest.approx((peak, facts.torque * problem.points[0].speed))
 
 
 def test_a_file_needs_no_bore_of_the_engine() -> None:

@@ -9,10 +9,11 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.machine import Chambers, Cycle, Engine, OperatingPoint, PressureTrace, SliderCrank
-from laufruhe.machine.chambers import CylinderGases
+from laufruhe.machine.chambers import Chamber, CylinderGases
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import OneChamber, chamber_cycle_of, pressure_at
 from laufruhe.physics.gas_loads import gas_coefficients
+from laufruhe.physics.working_chambers import chamber_pressure
 
 _STEPS, _ROUNDING = 7200, 1e-9
 """Number of crank angles at which the pressure of a cycle is compared, and relative rounding error of a plateau."""
@@ -47,11 +48,16 @@ class GasFacts:
 
 
 def cylinder_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> list[tuple[str, GasFacts]]:
-    """Return the key figures of the gas at an operating point, after its name; of each cylinder if they differ.
+    """Return the key figures of the gas at an operating point, after its name.
 
-    The list is empty where `gas_facts` returns None.
+    Cylinders that differ in gas and the working chambers of a rod have figures of their own.
     """
     gas, engines = fidelity.gas_of(point), [(point.name, point, engine)]
+    if isinstance(gas, Chambers):
+        return [
+            (f"{point.name}, {chamber.name}", _chamber_facts(engine, point, gas, chamber, fidelity))
+            for chamber in gas.chambers
+        ]
     if isinstance(gas, CylinderGases):
         engines = [
             (f"{point.name}, {part.name}", replace(point, gas=gas.of_cylinder(part.name)), alone)
@@ -81,6 +87,25 @@ def gas_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT)
     return GasFacts(
         peak, math.remainder(angle, period), minimum, work / swept[first], sum(torques), sum(torques) * point.speed,
         sum(swept), recording,
+    )  # fmt: skip
+
+
+def _chamber_facts(
+    engine: Engine, point: OperatingPoint, gas: Chambers, chamber: Chamber, fidelity: Fidelity
+) -> GasFacts:
+    """Return the key figures of one chamber, which works once a turn (G14)."""
+    parts, alone = (
+        [part for part in engine.slider_cranks if part.name in chamber.cylinders],
+        replace(gas, chambers=(chamber,)),
+    )
+    torque = sum(float(gas_coefficients(alone, part, engine.cycle, fidelity).coefficients[0].real) for part in parts)
+    angles = math.tau * np.arange(_STEPS) / _STEPS
+    pressures = chamber_pressure(chamber, parts[0], angles)
+    peak = int(np.argmax(pressures > (1.0 - _ROUNDING) * pressures.max()))
+    swept = chamber.area * sum(part.stroke for part in parts)
+    return GasFacts(
+        float(pressures[peak]), math.remainder(float(angles[peak]), math.tau), float(pressures.min()),
+        torque * math.tau / swept, torque, torque * point.speed, swept, (),
     )  # fmt: skip
 
 

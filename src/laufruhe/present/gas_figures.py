@@ -9,7 +9,7 @@ from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
 from laufruhe.present.numbers import DEGREE, share, trimmed
 from laufruhe.problem.problem import Problem
 
-HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "mean torque [N m]", "power [kW]", "power [kW/l]")
+HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "gas torque [N m]", "power [kW]", "power [kW/l]")
 """Heads of the figures of the gas."""
 _LINES = 8
 """Largest number of operating points with a line of their own."""
@@ -38,7 +38,7 @@ def gas_lines(problem: Problem) -> list[str]:
     lines, rows = [f"gas: {sentence}" for sentence in gas_note(problem)], gas_rows(problem)
     for name, peak, angle, imep, torque, power, density in rows[:_LINES]:
         lines.append(
-            f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, mean torque {torque} N m, "
+            f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, gas torque {torque} N m, "
             f"power {power} kW, {density} kW/l"
         )
     further = len(rows) - _LINES
