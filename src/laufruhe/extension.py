@@ -101,6 +101,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "commands": {
         "page": "served_page",
         "balance": "balancing",
+        "compare": "comparison",
         "drawing": "workshop",
         "export": "exchange",
         "identify": "identification",

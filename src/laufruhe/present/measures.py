@@ -58,13 +58,14 @@ def places_of(result: Result) -> list[Places]:
     places_list += [
         places for places, is_available in has_data.items() if inside and (is_available or places.channel in requested)
     ]
-    loads = [
-        Measure(channel).load
-        for channel in CHANNELS.values()
-        if channel.title and not problem.fidelity.has_uneven_speed
-    ]
-    loads_of = [load for load in loads if load.needs.of(engine) and load.places(engine)]
-    return [*places_list, *(Places(load.name.replace(" ", "_"), load, load.title, load.place) for load in loads_of)]
+    titled = () if problem.fidelity.has_uneven_speed else titled_places()
+    return [*places_list, *(one for one in titled if one.channel.needs.of(engine) and one.channel.places(engine))]
+
+
+def titled_places() -> list[Places]:
+    """Return the loads that every report shows at their places, such as those of extensions."""
+    loads = [Measure(channel).load for channel in CHANNELS.values() if channel.title]
+    return [Places(load.name.replace(" ", "_"), load, load.title, load.place) for load in loads]
 
 
 def hardest_point(result: Result) -> int:

@@ -41,8 +41,8 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
         _print_place(console, folder, PAGE)
 
 
-def show_document(document: Document, stream: TextIO, folder: Path, page: str) -> None:
-    """Print words and tables of a page, and the place of its files."""
+def show_document(document: Document, stream: TextIO, folder: Path | None, page: str) -> None:
+    """Print words and tables of a page, and the place of its files if there are any."""
     console = _console(stream, document.title)
     for block in document.blocks:
         match block:
@@ -60,7 +60,8 @@ def show_document(document: Document, stream: TextIO, folder: Path, page: str) -
             case Table():
                 _print_grid(console, block)
                 console.print()
-    _print_place(console, folder, page)
+    if folder is not None:
+        _print_place(console, folder, page)
 
 
 def _console(stream: TextIO, title: str) -> Console:
