@@ -26,8 +26,10 @@ from laufruhe.files import number_tables
 from laufruhe.files.number_tables import Unit, number_table, unit_in
 from laufruhe.files.reader import load
 from laufruhe.machine import PressureTrace
-from laufruhe.physics.gas_facts import GasFacts, gas_facts
+from laufruhe.physics.gas_facts import GasFacts, cylinder_facts, gas_facts
 from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
+from laufruhe.present.gas_figures import gas_lines
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from recorded_cycle import BORE, DEGREES, ROD, STROKE, cycle_pressure, mean_torque
 
@@ -160,7 +162,7 @@ def test_a_zero_at_the_other_dead_centre_is_doubted(tmp_path: Path) -> None:
     (warning,) = map(str, problem.plausibility_warnings)
     assert "mean torque of the gas: is -9.5" in warning
     assert (
-        "lies 192 deg after the firing dead centre; check angle_zero; 180 deg less would move the peak to 12 deg"
+        "lies 191.9 deg after the firing dead centre; check angle_zero; 180 deg less would move the peak to 11.92 deg"
         in warning
     )
     assert facts_of(problem)[0].torque == pytest.approx(-9.52, abs=0.01)
@@ -171,7 +173,7 @@ def test_a_zero_at_the_other_dead_centre_is_doubted(tmp_path: Path) -> None:
     negative = " ".join(
         map(str, bench("other-dead-centre.csv", tmp_path, gas="angle_zero = 360").plausibility_warnings)
     )
-    assert "check angle_zero; 180 deg more would move the peak to 12 deg" in negative
+    assert "check angle_zero; 180 deg more would move the peak to 11.92 deg" in negative
     right = bench("other-dead-centre.csv", tmp_path, gas="angle_zero = -180")
     assert not right.plausibility_warnings
     assert facts_of(right)[0].torque == pytest.approx(15.60, abs=0.01)
@@ -541,7 +543,7 @@ def test_check_solve_and_json_say_how_the_file_was_read(tmp_path: Path) -> None:
     assert lines[0].startswith("ok: scene, 1 cylinder")
     assert "gas: Of 8 cycles, with peaks of 55.09 bar and a standard deviation of 2.14 bar, the mean is used." in lines
     assert lines[-1].startswith(
-        "gas at 1500 rpm: peak 55.08 bar at 12 deg, imep 4.915 bar, gas torque 15.73 N m, power 2.47 kW"
+        "gas at 1500 rpm: peak 55.08 bar at 11.88 deg, imep 4.915 bar, gas torque 15.73 N m, power 2.47 kW"
     )
     solved = run("solve", path, "--out", tmp_path / "out", "--json", tmp_path / "r.json")
     assert solved.exit_code == 0, solved.output
@@ -550,7 +552,7 @@ def test_check_solve_and_json_say_how_the_file_was_read(tmp_path: Path) -> None:
         assert "Of 8 cycles" in " ".join(text.split())
     (head, row) = (tmp_path / "out" / "gas-pressure.csv").read_text(encoding="utf-8").splitlines()
     assert head.split(",")[:4] == ["at", "peak [bar]", "peak at [deg]", "imep [bar]"]
-    assert row.startswith("1500 rpm,55.08,12.0,4.915,15.73,2.47,")
+    assert row.startswith("1500 rpm,55.08,11.88,4.915,15.73,2.47,")
     (point,) = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))["points"]
     facts, _, recording = facts_of(problem)
     assert point["gas"]["imep"] == pytest.approx(facts.imep)
@@ -565,3 +567,86 @@ def test_other_problems_say_nothing_of_records(tmp_path: Path) -> None:
     checked = run("check", tmp_path / "f.toml", "--json", "-")
     assert "gas:" not in checked.output
     assert '"recording"' not in checked.output
+
+
+def in_columns(folder: Path, columns: dict[str, np.ndarray], name: str = "columns.csv") -> None:
+    rows = np.column_stack([DEGREES, *columns.values()])
+    head = ";".join(["angle [deg]", *(f"{column} [bar]" for column in columns)])
+    np.savetxt(folder / name, rows, "%.6f", ";", header=head, comments="")
+
+
+def test_statistics_of_a_test_bench_are_no_cycles(tmp_path: Path) -> None:
+    for names in (("PCYL1_AVG", "_MIN", "_MAX", "_STD"), ("Mittelwert", "Minimum", "Maximum", "Standardabw.")):
+        in_columns(tmp_path, dict(zip(names, (P, 0.8 * P, 1.3 * P, 0.1 * P), strict=True)))
+        facts, _, recording = facts_of(problem_with(tmp_path, "columns.csv"))
+        assert facts.peak_pressure == pytest.approx(1e5 * P.max(), rel=1e-4)
+        assert f"Columns that are not used: '{names[1]}" in " ".join(recording)
+
+
+def test_columns_of_cylinders_are_no_cycles(tmp_path: Path) -> None:
+    for names in (("Zyl. 1", "Zyl. 2"), ("p1", "p2"), ("PCYL1", "PCYL2")):
+        in_columns(tmp_path, dict.fromkeys(names, P))
+        with pytest.raises(InputError, match=r"may have one cylinder in each of .*write cylinder_columns"):
+            problem_with(tmp_path, "columns.csv")
+    in_columns(tmp_path, {"PCYL1 Z01": P, "PCYL1 Z02": P})
+    assert "as cycles of one cylinder" in facts_of(problem_with(tmp_path, "columns.csv"))[2][0]
+
+
+def test_cycles_that_scatter_are_doubted(tmp_path: Path) -> None:
+    in_columns(tmp_path, {"a": P, "b": 2.0 * P})
+    assert "are all of one cylinder" in " ".join(facts_of(problem_with(tmp_path, "columns.csv"))[2])
+
+
+def with_points(folder: Path, points: str, gas: str = "") -> Problem:
+    in_columns(folder, {"p": P}, "full.csv")
+    in_columns(folder, {"p": 1.0 + 0.3 * (P - 1.0)}, "idle.csv")
+    text = f'title = "Recorded"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n{SINGLE}'
+    path = folder / "points.toml"
+    path.write_text(f'{text}[gas]\nmodel = "trace"\nfile = "full.csv"\n{gas}\n{points}')
+    return load(path)
+
+
+def test_a_load_at_the_brake_leaves_the_rest_of_a_recorded_pressure_to_friction(tmp_path: Path) -> None:
+    problem = with_points(
+        tmp_path,
+        '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\npressure_file = "idle.csv"\nbrake_torque = "0 N m"\n'
+        '[[operating_points]]\nname = "full"\nspeed = "3000 rpm"\nbmep = "2 bar"\n',
+    )
+    for point, brake in zip(problem.points, (0.0, 2e5 * math.pi / 4.0 * 0.08**3 / (4.0 * math.pi)), strict=True):
+        ((_, facts),) = cylinder_facts(problem.engine, point)
+        assert facts.torque - facts.friction == pytest.approx(brake, abs=1e-9)
+    assert evaluate(problem).loads[0].wrench.coefficients[0, 3].real == pytest.approx(0.0, abs=1e-9)
+    idle, full = (cylinder_facts(problem.engine, point)[0][1] for point in problem.points)
+    assert idle.imep == pytest.approx(0.3 * full.imep, rel=1e-3)
+    lines = gas_lines(problem)
+    assert lines[-2].endswith("; brake torque 0 N m")
+    assert not any("One record counts" in line for line in lines)
+    with pytest.raises(InputError, match=r"bmep: is more than the gas gives, whose recorded imep is"):
+        with_points(tmp_path, '[[operating_points]]\nspeed = "800 rpm"\nbmep = "20 bar"\n')
+
+
+def test_one_record_at_several_speeds_is_said(tmp_path: Path) -> None:
+    points = "".join(f'[[operating_points]]\nspeed = "{n} rpm"\n' for n in (800, 3000))
+    assert any("One record counts at 2 speeds" in line for line in gas_lines(with_points(tmp_path, points)))
+    seiliger = '[[operating_points]]\nspeed = "800 rpm"\npressure_file = "none.csv"\n'
+    with pytest.raises(InputError, match=r"gas.file = .none.csv."):
+        with_points(tmp_path, seiliger)
+
+
+@pytest.mark.parametrize(("late", "is_doubted"), [(0.8, True), (-0.5, False)])
+def test_a_motored_pressure_peaks_before_dead_centre(tmp_path: Path, late: float, is_doubted: bool) -> None:
+    since = np.radians(DEGREES - late)
+    motored = 1.0 + 20.0 * np.exp(-((np.remainder(since + math.pi, 2.0 * math.pi) - math.pi) ** 2) / 0.1) * (
+        np.abs(since) < 3.0
+    )
+    rows = np.column_stack([DEGREES, P, motored])
+    np.savetxt(tmp_path / "full.csv", rows, "%.6f", ";", header="angle [deg];fired [bar];drag [bar]", comments="")
+    text = f'title = "Recorded"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n{SINGLE}[gas]\nmodel = "trace"\n'
+    text += 'file = "full.csv"\nangle_zero = "firing"\npressure_column = 2\nmotored_column = 3\n'
+    path = tmp_path / "motored.toml"
+    path.write_text(text + '[[operating_points]]\nspeed = "800 rpm"\nmotored = true\n')
+    doubts = [str(doubt) for doubt in load(path).plausibility_warnings]
+    assert len(doubts) == is_doubted
+    assert all(
+        "motored pressure: has its peak 0.8 deg after dead centre; check angle_zero" in doubt for doubt in doubts
+    )

@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.interpolate import lagrange
+from scipy.optimize import minimize_scalar
 
 from lanes import first_fast
 from laufruhe.machine import Cycle, Engine, OperatingPoint, PressureTrace, SliderCrank
@@ -161,7 +163,11 @@ def test_key_figures_are_those_of_an_integration() -> None:
     assert facts.displacement == pytest.approx(AREA * 2.0 * CRANK)
     assert facts.imep == pytest.approx(4.0 * math.pi * mean_torque() / (AREA * 2.0 * CRANK), rel=1e-5)
     assert facts.peak_pressure == pressures.max()
-    assert facts.peak_angle == angles[pressures.argmax()]
+    top = int(pressures.argmax())
+    near = slice(top - 1, top + 2)
+    parabola = lagrange(angles[near], pressures[near])
+    least = minimize_scalar(lambda angle: -parabola(angle), bounds=angles[[top - 1, top + 1]], options={"xatol": 1e-12})
+    assert facts.peak_angle == pytest.approx(least.x, abs=1e-6)
     assert torque_parts(engine, OperatingPoint("1000 rpm", 100.0, trace))["gas"].coefficients[0].real == pytest.approx(
         facts.torque
     )

@@ -267,7 +267,7 @@ def _traces(
         if table.pressure_column is None and columns is None:
             rule = "is given without pressure_column, which has the pressure with combustion"
             raise Refused("gas.motored_column", table.motored_column, rule, "name both columns")
-        motored = read(table.model_copy(update={"pressure_column": [table.motored_column]}))
+        motored = replace(read(table.model_copy(update={"pressure_column": [table.motored_column]})), is_motored=True)
     if table.single_cylinders:
         rule, remedy = "means nothing with model trace", "name a column of each cylinder by cylinder_columns"
         raise Refused("gas.single_cylinders", None, rule, remedy)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -18,8 +18,9 @@ from laufruhe.files.cylinder_states import StateTable, cylinder_states
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.gas import GasTable, SeiligerTable, WiebeTable
 from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, PressureTrace, Seiliger, SliderCrank, Wiebe
-from laufruhe.machine.chambers import CommonGas, CylinderGases
+from laufruhe.machine.chambers import CommonGas, CylinderGases, models_of
 from laufruhe.machine.gas import AMBIENT_PRESSURE
+from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
@@ -41,8 +42,12 @@ class OperatingPointTable(StateTable):
         "Absolute pressure in the manifold at this point, in place of that of [gas]; 0.3 to 0.5 bar in a throttled "
         "engine at idle."
     )
+    pressure_file: str | None = f.optional(
+        "File of the pressure recorded at this point, read as that of [gas] with model trace."
+    )
     bmep: f.NonNegativePressure | None = f.optional(
-        "Brake mean effective pressure, 0 at idle; [friction] adds what friction takes, and its uncertainty."
+        "Brake mean effective pressure, 0 at idle; [friction] adds what friction takes, and its uncertainty. With a "
+        "recorded pressure friction is the difference to its imep."
     )
     brake_torque: f.NonNegativeTorque | None = f.optional("Torque at the brake, in place of bmep.")
     motored: bool = f.optional("The charge is compressed without combustion.", False)
@@ -161,12 +166,13 @@ def with_load(table: GasTable | None, points: Sequence[OperatingPointTable]) -> 
 
 def operating_points(
     tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float | None,
-    brake: Brake | None, parts: Sequence[SliderCrank],
+    brake: Brake | None, parts: Sequence[SliderCrank], read: Callable[[str, str], GasModel | None],
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
     """Return the operating points of a file; points that give no load have the gas of [gas].
 
-    The stroke [m] turns a mean piston speed into a crank speed; it is None for an engine without pistons. `parts` are
-    the slider-cranks in the order of cylinder numbers.
+    `read` returns the gas of a recorded file, and names a key in complaints. The stroke [m] turns a mean piston speed
+    into a crank speed; it is None for an engine without pistons. `parts` are the slider-cranks in the order of cylinder
+    numbers.
     """
     points = []
     for k, table in enumerate(tables, 1):
@@ -174,12 +180,19 @@ def operating_points(
         _check_combustion(table, where)
         speeds = _speeds(table, stroke, where)
         states = cylinder_states(table, parts, where, table.name is not None)
+        base = gas if table.pressure_file is None else read(table.pressure_file, f"{where}.pressure_file")
         for speed in speeds:
             speed_text = units.quantity_text(speed, "rad/s", 6)
             name = (f"{table.name} {speed_text}" if len(speeds) > 1 else table.name) if table.name else speed_text
-            loads = _loads(table, speed, brake, where, name)
+            recorded = base if any(isinstance(model, PressureTrace) for model in models_of(base)) else None
+            has_brake = table.bmep is not None or table.brake_torque is not None
+            loads = (
+                [("", None, _recorded_friction(table, recorded, cycle, parts, where))]
+                if recorded and has_brake and not table.motored
+                else _loads(table, speed, brake, where, name)
+            )
             for suffix, imep, fmep in loads:
-                load = _loaded(gas, table.model_copy(update={"imep": imep}), cycle, where)
+                load = _loaded(base, table.model_copy(update={"imep": imep}), cycle, where)
                 share = table.weight / len(speeds) / len(loads) / len(states)
                 points += [
                     OperatingPoint(f"{name}{suffix}{state.suffix}", speed, state.gas(load, cycle, where), share, fmep)
@@ -252,6 +265,24 @@ def _loads(
         return [("", middle, middle - bmep)]
     loads = ((", least load", lowest), (", mean load", middle), (", most load", largest))
     return [(suffix, imep, imep - bmep) for suffix, imep in loads]
+
+
+def _recorded_friction(
+    table: OperatingPointTable, gas: GasModel, cycle: Cycle, parts: Sequence[SliderCrank], where: str
+) -> float:
+    """Return the mean pressure of friction [Pa]: that of the recorded pressure less that at the brake (L5b)."""
+    if table.imep is not None or (table.bmep is not None and table.brake_torque is not None):
+        raise Refused(f"{where}.brake_torque", None, "is given beside another load", "keep one")
+    displacement = sum(part.piston_area * part.stroke for part in parts)
+    torque = sum(float(gas_coefficients(gas, part, cycle).coefficients[0].real) for part in parts)
+    imep = mean_pressure(torque, displacement, cycle.turns)
+    key = "bmep" if table.brake_torque is None else "brake_torque"
+    bmep = table.bmep if table.brake_torque is None else mean_pressure(table.brake_torque, displacement, cycle.turns)
+    friction = imep - (bmep or 0.0)
+    if friction < 0.0:
+        rule = f"is more than the gas gives, whose recorded imep is {units.quantity_text(1e-5 * imep, 'bar')}"
+        raise Refused(f"{where}.{key}", None, rule, "check angle_zero of [gas], and the load")
+    return friction
 
 
 def _loaded_cylinders(gas: CylinderGases, table: OperatingPointTable, cycle: Cycle, where: str) -> CylinderGases:

@@ -47,7 +47,7 @@ from laufruhe.files.quantities import with_followers
 from laufruhe.files.ready import ready_named
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.toml_text import line_deeper_than, toml_complaint, toml_text
-from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Origin, Problem, Search
@@ -324,8 +324,15 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent, is_mirrored), cycle_of(table)
     wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
-    gas = gas_of(with_load(file.gas, file.operating_points), path.parent, cycle, cylinders)
-    points = operating_points(file.operating_points, gas, cycle, table.stroke, brake, cylinders)
+    gas_table = with_load(file.gas, file.operating_points)
+    gas = gas_of(gas_table, path.parent, cycle, cylinders)
+
+    def recorded(name: str, where: str) -> GasModel | None:
+        if not isinstance(gas_table, TraceTable):
+            raise Refused(where, name, "needs [gas] with model trace", "give [gas] that model and a file")
+        return gas_of(gas_table.model_copy(update={"file": name}), path.parent, cycle, cylinders)
+
+    points = operating_points(file.operating_points, gas, cycle, table.stroke, brake, cylinders, recorded)
     if without_gas:
         points = tuple(replace(point, gas=None) for point in points)
     geared, of_geared = geared_of(file.geared_inertias)

@@ -19,10 +19,17 @@ from laufruhe.files.fields import Table
 from laufruhe.files.number_tables import NumberTable, Unit, unit_in
 from laufruhe.machine import Cycle, PressureTrace
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.pressure_trace import smooth_cycle
+from laufruhe.physics.pressure_trace import bottom_pressure, peak_angle, smooth_cycle
 from laufruhe.units import quantity_text
 
 _ANGLE_NAME = re.compile(r"angle|winkel|^(?:ca|kw|cad|theta|phi|alpha|gamma)\b", re.IGNORECASE)
+_STATISTIC_NAME = re.compile(
+    r"(?:^|[\W_])(?:min(?:imum)?|max(?:imum)?|median|std(?:dev)?|stdev|stabw|standardabw\w*|standard deviation|sigma|"
+    r"cov)(?:[\W_]|$)",
+    re.IGNORECASE,
+)
+"""Heading of a column that a test bench computes from several cycles, and that is no pressure over a cycle."""
+_CYLINDER_NAME = re.compile(r"^(?:p|p?[ _]?(?:cyl|zyl)[a-z]*[ ._-]*)\d+\s*(?:[\[(/].*)?$", re.IGNORECASE)
 _GAUGE_NAME = re.compile(r"gauge|überdruck|ueberdruck", re.IGNORECASE)
 _ALIKE = 0.9
 """Least correlation of columns that are cycles of one cylinder."""
@@ -35,6 +42,8 @@ _ROUNDING = 1e-9
 """Noise over the range of the pressure up to which it is that of the arithmetic."""
 _SAME_ANGLE = 1e-9
 """Difference of angles [rad] that is rounding of many turns."""
+_SCATTER = 0.25
+"""Standard deviation over the mean of the peaks from which columns may be no cycles of one cylinder."""
 _WHOLE = 0.95
 """Least share of the points of the longest cycle that a cycle has."""
 NEAR_FIRING = math.radians(60.0)
@@ -218,6 +227,7 @@ class RecordedFile:
         others = [k for k in range(len(units)) if k != self.angle_column]
         columns = [k for k in others if (unit := units[k]) and unit.dimension == self.records.si]
         columns = columns or [k for k in others if units[k] is None]
+        columns = [k for k in columns if not _STATISTIC_NAME.search(self.numbers.names[k])] or columns
         if not columns:
             rule = f"has no {self.records.name}s: {self.name(others[0])} has another unit"
             raise self.refused(rule, f"convert it to a {self.records.name}, which needs the gain of the sensor")
@@ -227,8 +237,17 @@ class RecordedFile:
             names = ", ".join(map(self.name, columns))
             raise self.refused(f"may have the {self.records.what} in {names}", f"name one by {key}")
         alike = [k for k in columns if k == first or _correlation(values[:, first], values[:, k]) > _ALIKE]
+        cylinders = [k for k in columns if _CYLINDER_NAME.search(self.numbers.names[k])]
+        if self.records is PRESSURE and len(set(alike) & set(cylinders)) > 1:
+            names = ", ".join(map(self.name, cylinders))
+            rule, remedy = (
+                f"may have one cylinder in each of {names}",
+                "write cylinder_columns = [...] with their names",
+            )
+            raise self.refused(rule, f"{remedy}, or pressure_column = [...] if they are cycles of one cylinder")
         unused = [self.name(k) for k in others if k not in alike]
-        self.said += [f"Columns that are not used: {', '.join(unused)}."] if unused else []
+        of_cylinders = "; cylinder_columns gives each cylinder its own" if len(cylinders) > 1 else ""
+        self.said += [f"Columns that are not used: {', '.join(unused)}{of_cylinders}."] if unused else []
         return alike
 
     def angles(self) -> Array:
@@ -331,6 +350,9 @@ def recorded_trace(
     if pressures.min() <= 0.0:
         rule = f"has pressures down to {PRESSURE.text(pressures.min())}, which are not absolute"
         raise file.refused(rule, 'write gauge = true, or peg = { at = "-180 deg", to = "1 bar" } with what is known')
+    if pace == 1.0:
+        bottom = PRESSURE.text(bottom_pressure(angles, pressures, period))
+        file.said.append(f"Pressure at the bottom dead centre before compression: {bottom}.")
     with errors_at_key(f"{where}.file", table.file):
         return PressureTrace(tuple(angles.tolist()), tuple(pressures.tolist()), air, tuple(file.said))
 
@@ -418,6 +440,8 @@ def _chosen(file: RecordedFile, cycles: Array) -> Array:
         raise file.refused(rule, f"check engine.cycle, or name one by {file.records.name}_column or cycles")
     spread, text = file.records.text(peaks.std(ddof=1), 3), file.records.text(peaks.mean())
     which = f"Of {count} cycles, with peaks of {text} and a standard deviation of {spread}"
+    if peaks.std(ddof=1) > _SCATTER * peaks.mean():
+        which += " (more than usual; are all of one cylinder and one load?)"
     if choice == "mean":
         file.said.append(f"{which}, the mean is used.")
         return mean
@@ -442,7 +466,7 @@ def _zero(
     is_near = abs(math.remainder(peak - exchange, period)) < NEAR_FIRING
     is_exchange = bool(exchange) and is_near and rise.max() > 2.0 * rise[opposite].max(initial=0.0)
     start = exchange if is_exchange else 0.0
-    place = math.degrees(math.remainder(peak + start, period))
+    place = math.degrees(math.remainder(peak_angle(angles, pressures) + start, period))
     dead_centre = f"0 deg of the file is taken as the {_EXCHANGE if is_exchange else 'firing'} dead centre"
     file.said.append(f"{dead_centre}; the peak then lies {place:.4g} deg after firing.")
     return start

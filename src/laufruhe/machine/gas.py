@@ -157,6 +157,8 @@ class PressureTrace:
         Sentences about how the trace was read from its file.
     motored
         Trace of the same cylinder without combustion; None if it was not recorded.
+    is_motored
+        True for such a trace.
     """
 
     angles: tuple[float, ...]
@@ -164,6 +166,7 @@ class PressureTrace:
     crankcase_pressure: float = AMBIENT_PRESSURE
     recording: tuple[str, ...] = field(default=(), compare=False)
     motored: PressureTrace | None = None
+    is_motored: bool = False
 
     def __post_init__(self) -> None:
         check_pressures(self, "crankcase_pressure")

@@ -13,6 +13,8 @@ from laufruhe.machine.chambers import Chamber, CylinderGases
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import OneChamber, chamber_cycle_of, pressure_at
 from laufruhe.physics.gas_loads import gas_coefficients
+from laufruhe.physics.pressure_trace import peak_angle
+from laufruhe.physics.willans import mean_torque
 from laufruhe.physics.working_chambers import chamber_pressure
 
 _STEPS, _ROUNDING = 7200, 1e-9
@@ -31,6 +33,8 @@ class GasFacts:
         Least absolute pressure, and work of one cycle over the displacement (G3) [Pa].
     torque, power
         Mean torque of the gas in all cylinders [N m], and its power [W].
+    friction
+        Mean torque that friction takes of it (L5b) [N m].
     displacement
         Swept volume of all cylinders [m3].
     recording
@@ -43,6 +47,7 @@ class GasFacts:
     imep: float
     torque: float
     power: float
+    friction: float
     displacement: float
     recording: tuple[str, ...]
 
@@ -86,7 +91,7 @@ def gas_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT)
     recording = gas.recording if isinstance(gas, PressureTrace) else ()
     return GasFacts(
         peak, math.remainder(angle, period), minimum, work / swept[first], sum(torques), sum(torques) * point.speed,
-        sum(swept), recording,
+        mean_torque(point.fmep, sum(swept), engine.cycle.turns), sum(swept), recording,
     )  # fmt: skip
 
 
@@ -105,18 +110,18 @@ def _chamber_facts(
     swept = chamber.area * sum(part.stroke for part in parts)
     return GasFacts(
         float(pressures[peak]), math.remainder(float(angles[peak]), math.tau), float(pressures.min()),
-        torque * math.tau / swept, torque, torque * point.speed, swept, (),
+        torque * math.tau / swept, torque, torque * point.speed,
+        mean_torque(point.fmep, swept, engine.cycle.turns), swept, (),
     )  # fmt: skip
 
 
 @lru_cache(maxsize=64)
 def _extremes(gas: OneChamber, part: SliderCrank, cycle: Cycle, period: float) -> tuple[float, float, float]:
-    # largest pressure, its angle after firing, and least pressure; of a trace at its points
+    # largest pressure, its angle after firing, and least pressure
     if isinstance(gas, PressureTrace):
-        angles, pressures = np.array(gas.angles), np.array(gas.pressures)
-    else:
-        angles = period * np.arange(_STEPS) / _STEPS
-        # at a dead centre the pressure is that after ignition
-        pressures = pressure_at(gas, part, cycle, angles + _ROUNDING)
+        return max(gas.pressures), peak_angle(np.array(gas.angles), np.array(gas.pressures)), min(gas.pressures)
+    angles = period * np.arange(_STEPS) / _STEPS
+    # at a dead centre the pressure is that after ignition
+    pressures = pressure_at(gas, part, cycle, angles + _ROUNDING)
     peak = int(np.argmax(pressures > (1.0 - _ROUNDING) * pressures.max()))
     return float(pressures[peak]), float(angles[peak]), float(pressures.min())

@@ -47,6 +47,21 @@ def periodic_cubics(points: Array, heights: Array, cycle: Cycle, angles: Array, 
     return np.asarray(PchipInterpolator(around, values)(local))
 
 
+def peak_angle(angles: Array, pressures: Array) -> float:
+    """Return the angle of the largest pressure [rad]: the top of a parabola through three points."""
+    k = int(np.argmax(pressures))
+    if 0 < k < len(angles) - 1 and pressures[k] > max(pressures[k - 1], pressures[k + 1]):
+        steps = angles[k - 1 : k + 2] - angles[k]
+        second, first, _ = np.polyfit(steps, pressures[k - 1 : k + 2] - pressures[k], 2)
+        return float(angles[k] - 0.5 * first / second)
+    return float(angles[k])
+
+
+def bottom_pressure(angles: Array, pressures: Array, period: float) -> float:
+    """Return the pressure half a turn before firing [Pa]."""
+    return float(np.interp(-math.pi, angles, pressures, period=period))
+
+
 @dataclass(frozen=True, eq=False)
 class SmoothCycle:
     """Measured cycle without its noise.

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+
 from laufruhe.errors import counted
-from laufruhe.machine import Chambers, Compressor
-from laufruhe.machine.chambers import models_of
+from laufruhe.machine import Chambers, Compressor, PressureTrace
+from laufruhe.machine.chambers import GasModel, models_of
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
 from laufruhe.present.numbers import DEGREE, share, trimmed
 from laufruhe.problem.problem import Problem
 
-HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "gas torque [N m]", "power [kW]", "power [kW/l]")
-"""Heads of the figures of the gas."""
+HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "gas torque [N m]", "gas power [kW]", "power [kW/l]",
+        "brake torque [N m]")  # fmt: skip
+"""Heads of the figures of the gas, before friction; the last one is after it."""
 _LINES = 8
 """Largest number of operating points with a line of their own."""
 
@@ -29,18 +32,27 @@ def gas_note(problem: Problem) -> list[str]:
         for chamber in chambers
         if isinstance(chamber.diagram, Compressor)
     )
-    recorded = (sentence for _, facts in _facts(problem) for sentence in facts.recording)
+    recorded = [sentence for _, facts in _facts(problem) for sentence in facts.recording]
+    speeds = defaultdict[GasModel, set[float]](set)
+    for point in problem.points:
+        gas = problem.fidelity.gas_of(point)
+        if gas and any(isinstance(model, PressureTrace) for model in models_of(gas)):
+            speeds[gas].add(point.speed)
+    recorded += [
+        f"One record counts at {len(several)} speeds; pressure_file of an operating point gives another."
+        for several in speeds.values()
+        if len(several) > 1
+    ]
     return list(dict.fromkeys([*recorded, *compressors]))
 
 
 def gas_lines(problem: Problem) -> list[str]:
     """Return the sentences of `gas_note`, and a line for each operating point with gas."""
     lines, rows = [f"gas: {sentence}" for sentence in gas_note(problem)], gas_rows(problem)
-    for name, peak, angle, imep, torque, power, density in rows[:_LINES]:
-        lines.append(
-            f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, gas torque {torque} N m, "
-            f"power {power} kW, {density} kW/l"
-        )
+    for name, peak, angle, imep, torque, power, density, brake in rows[:_LINES]:
+        line = f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, gas torque {torque} N m, "
+        friction = f"; brake torque {brake} N m" if brake != torque else ""
+        lines.append(f"{line}power {power} kW, {density} kW/l{friction}")
     further = len(rows) - _LINES
     return [*lines, f"gas: the report has {counted(further, 'further operating point')}"] if further > 0 else lines
 
@@ -51,6 +63,8 @@ def _facts(problem: Problem) -> list[tuple[str, GasFacts]]:
 
 def _figures(facts: GasFacts) -> list[str]:
     kilowatts, litres = 1e-3 * facts.power, 1e3 * facts.displacement
+    # friction that takes all torque leaves rounding
+    brake = facts.torque - facts.friction if abs(facts.torque - facts.friction) > 1e-9 * abs(facts.torque) else 0.0
     bars = 1e-5 * facts.peak_pressure, 1e-5 * facts.imep
-    numbers = bars[0], DEGREE * facts.peak_angle, bars[1], facts.torque, kilowatts, kilowatts / litres
+    numbers = bars[0], DEGREE * facts.peak_angle, bars[1], facts.torque, kilowatts, kilowatts / litres, brake
     return [trimmed(number) for number in numbers]

@@ -7,11 +7,14 @@ from collections import defaultdict
 from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 
+import numpy as np
+
 from laufruhe.errors import Complaint, ModelError
 from laufruhe.machine import Engine, OperatingPoint, PressureTrace
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.exact_angles import as_turn, reduced_turn
-from laufruhe.physics.gas_facts import gas_facts
+from laufruhe.physics.gas_facts import GasFacts, gas_facts
+from laufruhe.physics.pressure_trace import bottom_pressure
 from laufruhe.units import quantity_text
 
 FASTEST = 30.0
@@ -33,6 +36,8 @@ MAX_PEAK, MIN_GAS = 300e5, 0.1e5
 """Largest usual peak pressure, and least usual absolute pressure in a cylinder [Pa]; diesel engines reach 250 bar."""
 MAX_KILOPASCAL = 30_000e5
 """Largest usual peak pressure if kPa are taken as bar [Pa]."""
+MAX_INTAKE, LEAST_RISE = 2e5, 25.0
+"""Largest pressure before compression that raises no doubt [Pa], and least ratio of the peak to a larger one."""
 LATEST_PEAK = math.radians(60.0)
 """Largest usual angle between firing and peak pressure."""
 MAX_POWER = 250e6
@@ -130,13 +135,13 @@ def _of_firing(engine: Engine) -> Iterator[Complaint]:
 
 def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
     for point in points:
-        facts = None
+        facts, gas = None, point.gas
         with suppress(ModelError):
             # the evaluation reports a cycle that cannot be met
             facts = gas_facts(engine, point)
         if facts is None:
             continue
-        is_trace = isinstance(point.gas, PressureTrace)
+        is_trace = isinstance(gas, PressureTrace)
         peak = quantity_text(1e-5 * facts.peak_pressure, "bar")
         if facts.peak_pressure > MAX_PEAK:
             rule = "is more than 300 bar; diesel engines reach 250 bar"
@@ -149,6 +154,10 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
             yield Complaint(
                 "least pressure of the gas", lowest, rule, "check gauge and peg; pressures must be absolute"
             )
+        if isinstance(gas, PressureTrace):
+            yield from _of_trace(gas, facts, engine.cycle.angle)
+            if gas.is_motored:
+                continue
         lies_late = abs(facts.peak_angle) > LATEST_PEAK and facts.peak_pressure > 2.0 * abs(facts.least_pressure)
         angle = math.degrees(facts.peak_angle)
         place = f"the peak of {peak} lies {angle:.4g} deg after the firing dead centre"
@@ -168,3 +177,16 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
             rule = f"is {1e-6 * facts.power / facts.displacement:.3g} kW for each litre; racing engines reach 230 kW"
             pressure = "pressure_unit" if is_trace else "imep"
             yield Complaint("power of the gas", power, rule, f"check {pressure}, bore, stroke and speed")
+
+
+def _of_trace(trace: PressureTrace, facts: GasFacts, period: float) -> Iterator[Complaint]:
+    bottom = bottom_pressure(np.array(trace.angles), np.array(trace.pressures), period)
+    is_charged = bottom > MAX_INTAKE and facts.peak_pressure < LEAST_RISE * bottom
+    if is_charged and not trace.is_motored and abs(facts.peak_angle) < LATEST_PEAK:
+        value, peak = (quantity_text(1e-5 * pressure, "bar") for pressure in (bottom, facts.peak_pressure))
+        rule = f"is more than usual before compression to a peak of {peak}"
+        yield Complaint("pressure at the bottom dead centre", value, rule, "check peg and gauge")
+    if trace.is_motored and (facts.imep > 0.0 or facts.peak_angle > 0.0):
+        rule = f"has its peak {quantity_text(facts.peak_angle, 'rad', 2)} after dead centre"
+        remedy = "check angle_zero; losses move the peak of a motored cylinder 0.3 to 1 deg before dead centre"
+        yield Complaint("motored pressure", "", rule, remedy)

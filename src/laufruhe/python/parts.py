@@ -43,9 +43,9 @@ class EngineParts(Parts):
         self, name: str | None = None, *, misfire: Sequence[int] | Literal["each"] | None = None,
         cut: Sequence[int] | None = None, cut_valves: Literal["closed", "open"] | None = None,
         speed: Value | None = None, mean_piston_speed: Value | None = None, imep: Value | None = None,
-        peak_pressure: Value | None = None, intake_pressure: Value | None = None, bmep: Value | None = None,
-        brake_torque: Value | None = None, motored: bool | None = None, gas: bool | None = None,
-        up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
+        peak_pressure: Value | None = None, intake_pressure: Value | None = None, pressure_file: str | None = None,
+        bmep: Value | None = None, brake_torque: Value | None = None, motored: bool | None = None,
+        gas: bool | None = None, up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
     ) -> Self:
         """Return the engine with an operating point. Speeds and loads at which the engine is looked at."""
         return self._with("operating_points", "operating_point", keys_of(locals()))
