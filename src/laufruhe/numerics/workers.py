@@ -2,21 +2,17 @@
 
 All concurrent work uses this module: points of studies, problems of a comparison of fidelities, boxes, crank stars and
 start points. The executor changes the time of a search, never its result.
-
-`Speculation` computes likely next steps of a search ahead of time. The main process alone decides which step follows
-and takes a result that is ready, so results, their order and proofs are the same to the last bit.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from contextvars import ContextVar
-from itertools import count, islice, takewhile
-from pickle import PicklingError
-from typing import Any, Generic, ParamSpec, TypeVar
+from itertools import count, takewhile
+from typing import ParamSpec, TypeVar
 
 from laufruhe.errors import BoundError, SolverError
 from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, until_time_limit
@@ -204,74 +200,3 @@ def _reported(answer: tuple[A, list[BoundError]]) -> A:
 def _workers_gone(executor: Executor, error: BaseException) -> WorkersGone:
     text = getattr(executor, "gone", "workers died repeatedly")
     return WorkersGone(f"{text} ({error})" if str(error) else str(text))
-
-
-class Speculation(Generic[T, A]):
-    """Results of one kind of step of a search, some computed ahead of time.
-
-    Processes start once the search has taken `worth` seconds.
-    """
-
-    def __init__(self, work: Callable[[T], A], worth: float) -> None:
-        self._work, self._worth = work, worth
-        self._began = time.perf_counter()
-        self._executor: Executor | None = None
-        self._processes: Processes | None = None
-        self._starting: list[Future[int]] = []
-        self._pending: dict[Hashable, Future[tuple[A, list[BoundError]]]] = {}
-        self.hits = 0
-
-    def prefetch(self, steps: Iterable[tuple[Hashable, T]]) -> None:
-        """Submit likely next steps (key, step), the likeliest first, up to the number of free workers."""
-        executor = self._executor = self._executor or current_executor()
-        if worker_count() == 1:
-            return
-        if executor is None:
-            if time.perf_counter() - self._began <= self._worth:
-                return
-            executor = self._executor = self._processes = Processes()
-            # count starting processes as busy, so that no step waits for one; unpickling the work imports its module
-            self._starting = [executor.submit(id, self._work) for _ in range(worker_count(executor))]
-        new = ((key, step) for key, step in steps if key not in self._pending)
-        # without workers, and for steps that cannot be pickled, `result` computes the step
-        with suppress(RuntimeError, OSError):
-            begun: list[Future[Any]] = [*self._starting, *self._pending.values()]
-            free = worker_count(executor) - sum(not future.done() for future in begun)
-            for key, step in islice(new, max(free, 0)):
-                with suppress(PicklingError, AttributeError, TypeError):
-                    self._pending[key] = executor.submit(_answer_of, time.time() + seconds_left(), self._work, step)
-
-    def result(self, key: Hashable, step: T) -> A:
-        """Return the result of a step: the prefetched one of this key, else computed now."""
-        future = self._pending.pop(key, None)
-        if future is None:
-            return self._work(step)
-        try:
-            answer = future.result()
-        except Exception:
-            # the worker was lost, or the step fails again here with its own error
-            return self._work(step)
-        self.hits += 1
-        return _reported(answer)
-
-    def discard(self) -> None:
-        """Cancel all prefetched steps."""
-        for future in self._pending.values():
-            future.cancel()
-        self._pending.clear()
-
-    def end(self) -> None:
-        """Cancel all prefetched steps, and end the processes started for them."""
-        self.discard()
-        if self._processes is not None:
-            self._processes.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def speculation(work: Callable[[T], A], worth: float = WORTH_PROCESSES) -> Iterator[Speculation[T, A]]:
-    """Yield a `Speculation` for one search; its processes start after `worth` seconds, and end with the block."""
-    prefetched = Speculation(work, worth)
-    try:
-        yield prefetched
-    finally:
-        prefetched.end()

@@ -2,21 +2,15 @@
 
 For a program min q' x with b - A x in cones K, any z in the dual cones gives q' x >= (q + A' z)' x - b' z. Every design
 has variables x within known bounds and moments of known size, so that the right side has a minimum in closed form.
-
-Several objectives under the same constraints are bounded by one program; worker processes may bound them ahead.
 """
 
 from __future__ import annotations
 
 import math
-import pickle
-import threading
-from collections.abc import Hashable, Iterable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
-from uuid import uuid4
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, vstack
@@ -31,7 +25,6 @@ from laufruhe.extensions.mount_relaxation.program import (
     least_in_ball,
 )
 from laufruhe.numerics.arrays import Array, Indices
-from laufruhe.numerics.workers import Speculation, speculation
 from laufruhe.prove.mounts.dual_cones import (
     LENGTH,
     MATRIX,
@@ -59,12 +52,6 @@ _SETTINGS = {
     "static_regularization_constant": 1e-7,
     "max_step_fraction": 0.95,
 }
-
-# seconds spent on relaxations after which worker processes start; shorter searches need none
-START_SECONDS = 0.25
-
-_Step: TypeAlias = tuple[str, bytes, Array]
-Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,49 +298,6 @@ class ConeProgram:
     def _solver(self) -> ConeSolver:
         moments = [self._moment(k) for k in range(len(self.program.sizes))]
         return ConeSolver(self._matrix.tocoo(), np.concatenate(self.right), self.cones, moments, self._settings)
-
-
-class _Cache(threading.local):
-    """Cone program that this thread built last, by name."""
-
-    name = ""
-    program: ConeProgram | None = None
-
-
-_CACHE = _Cache()
-
-
-def _bound(step: _Step) -> tuple[float, Array]:
-    name, program, objective = step
-    if _CACHE.program is None or _CACHE.name != name:
-        _CACHE.name, _CACHE.program = name, ConeProgram(pickle.loads(program), ROUGH)
-    return _CACHE.program.minimum(objective)
-
-
-def bounds_ahead() -> AbstractContextManager[Ahead]:
-    """Return the executor that computes likely bounds ahead, for all boxes of one search."""
-    return speculation(_bound, START_SECONDS)
-
-
-class Objectives:
-    """Objectives under the constraints of one program, which each worker process copies, so that all bounds agree."""
-
-    def __init__(self, program: SdpProgram, ahead: Ahead | None) -> None:
-        self._name, self._program, self._ahead = uuid4().hex, pickle.dumps(program), ahead
-        if ahead is not None:
-            ahead.discard()
-
-    def bound(self, key: Hashable, objective: Array) -> tuple[float, Array]:
-        """Return the bound and optimum as `ConeProgram.minimum` does; `key` names the objective."""
-        step = (self._name, self._program, objective)
-        return _bound(step) if self._ahead is None else self._ahead.result((self._name, key), step)
-
-    def prefetch(self, objectives: Iterable[tuple[Hashable, Array]]) -> None:
-        """Start to bound objectives that are likely to be needed next, the most likely first."""
-        if self._ahead is not None:
-            self._ahead.prefetch(
-                ((self._name, key), (self._name, self._program, objective)) for key, objective in objectives
-            )
 
 
 def _entries(size: int) -> int:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from laufruhe.extensions.mount_relaxation.cone_program import Objectives, bounds_ahead
+from laufruhe.extensions.mount_relaxation.cone_program import ROUGH, ConeProgram
 from laufruhe.extensions.mount_relaxation.open_mounts import is_lifted
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.load_models.simulated import simulated_measures
@@ -110,20 +110,19 @@ def spring_bound(
     if not is_bounded(problem) or not 0.0 < value < math.inf:
         return BoxResult(0.0, 0)
     try:
-        with bounds_ahead() as ahead:
-            relaxation = SdpRelaxation(with_default_sampling(problem), value, gap_tolerance, reference, ahead)
-            if not relaxation.max_boxes or not relaxation.is_sampled_fully:
-                return BoxResult(0.0, 0)
-            # prove the tolerance at once, unless a box bounds little of the value
-            shares: tuple[float, ...]
-            if relaxation.modes:
-                shares, maximum = LEVELS, MAX_RELAXED
-            elif relaxation.has_loose_mean:
-                shares, maximum = (*FIRST, *LEVELS), FEW_RELAXED
-            else:
-                shares, maximum = (IN_BATCH, 0.0) if in_batch else (0.0,), relaxation.max_boxes
-            maximum = 1 if root_only else problem.search.boxes_or(maximum)
-            return _prove_levels(relaxation, gap_tolerance, shares, maximum, witness)
+        relaxation = SdpRelaxation(with_default_sampling(problem), value, gap_tolerance, reference)
+        if not relaxation.max_boxes or not relaxation.is_sampled_fully:
+            return BoxResult(0.0, 0)
+        # prove the tolerance at once, unless a box bounds little of the value
+        shares: tuple[float, ...]
+        if relaxation.modes:
+            shares, maximum = LEVELS, MAX_RELAXED
+        elif relaxation.has_loose_mean:
+            shares, maximum = (*FIRST, *LEVELS), FEW_RELAXED
+        else:
+            shares, maximum = (IN_BATCH, 0.0) if in_batch else (0.0,), relaxation.max_boxes
+        maximum = 1 if root_only else problem.search.boxes_or(maximum)
+        return _prove_levels(relaxation, gap_tolerance, shares, maximum, witness)
     except np.linalg.LinAlgError:
         # the middle of a box stands on an undamped resonance
         return BoxResult(0.0, 0)
@@ -271,7 +270,7 @@ def narrowed(
     sides = [(j, side) for j, side in enumerate(mounts.single_decisions) if side is not None]
     sides += [(numbers + k, count + k) for k in range(len(lower) - count)]
     variables, side_indices = np.array(sides, dtype=np.intp).reshape(-1, 2).T
-    objectives, units, solved = Objectives(program, search.ahead), np.eye(numbers + len(lower) - count), 0
+    cones, units, solved = ConeProgram(program, ROUGH), np.eye(numbers + len(lower) - count), 0
     # lower ends and negative upper ends; `nearest`: the nearest point of the relaxation to each end
     ends, nearest = np.array([lower, -upper]), np.array([upper, -lower])
     new_ends = ends.copy()
@@ -282,11 +281,10 @@ def narrowed(
         is_near = nearest[k, side] - ends[k, side] < END_SHARE * (upper[side] - lower[side])
         return not is_near and not search.is_at_end(lower, upper, side, signs[k])
 
-    for first, (number, side, k) in enumerate(candidates):
+    for number, side, k in candidates:
         if not pays(side, k):
             continue
-        objectives.prefetch(((n, end), signs[end] * units[n]) for n, j, end in candidates[first:] if pays(j, end))
-        minimum, point = objectives.bound((number, k), signs[k] * units[number])
+        minimum, point = cones.minimum(signs[k] * units[number])
         solved += 1
         new_ends[k, side] = max(new_ends[k, side], signs[k] * centre[side] + half[side] * minimum)
         if new_ends[:, side].sum() > 0.0:

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.extensions.mount_relaxation.box import BoxRelaxation
-from laufruhe.extensions.mount_relaxation.cone_program import Ahead
 from laufruhe.extensions.mount_relaxation.modes import mode_bases
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
 from laufruhe.extensions.mount_relaxation.orders import (
@@ -62,19 +61,10 @@ class SdpRelaxation:
         The best design as a point of the root box, without the coordinates of modes.
     modes, mode_sides
         Basis of each mode, shape (6, 6), and the slice of its coordinates in a box.
-    ahead
-        Executor that computes likely bounds ahead; None to compute everything in this process.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        value: float,
-        gap_tolerance: float,
-        reference: Sequence[Value],
-        ahead: Ahead | None = None,
-    ) -> None:
-        self.problem, self.value, self.cutoff, self.ahead = problem, value, value - GAP_SAFETY * gap_tolerance, ahead
+    def __init__(self, problem: Problem, value: float, gap_tolerance: float, reference: Sequence[Value]) -> None:
+        self.problem, self.value, self.cutoff = problem, value, value - GAP_SAFETY * gap_tolerance
         self.mount_numbers = len(problem.mount_decisions)
         lower, upper = real_bounds(problem.mount_decisions)
         self._reference = np.array(
