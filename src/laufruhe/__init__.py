@@ -194,7 +194,6 @@ def solve(
     SolverError
         If a solver stops without a result.
     """
-    from dataclasses import replace
     from numbers import Real
 
     from laufruhe.python.results import watched
@@ -202,7 +201,7 @@ def solve(
 
     if time_limit is not None and not (isinstance(time_limit, Real) and time_limit > 0.0):
         raise wrong_call("time_limit", time_limit, "must be a number of seconds above zero", "try 60")
-    checked = replace(_problem(problem), sharply=True)
+    checked = _problem(problem)
     if solver is not None:
         from laufruhe.solvers.methods import by_solver
 

@@ -30,7 +30,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.cones import conic, newton_polish, unbalances
+from laufruhe.solvers.cones import conic, unbalances
 
 OUT = PAGES / "cones.md"
 WAYS = ("as solved", "cone programs of all rows and columns")
@@ -51,7 +51,6 @@ def way(name: str) -> Iterator[None]:
         return
     with (
         patch.object(conic, "newton_solution", lambda _: None),
-        patch.object(newton_polish.NewtonProgram, "of", lambda _: None),
         patch.object(affine, "MANY_COLUMNS", sys.maxsize),
     ):
         yield

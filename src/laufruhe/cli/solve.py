@@ -71,6 +71,6 @@ def solve(problem: Problem, listener: Listener) -> Result:
     import laufruhe.solvers as solvers
 
     try:
-        return solvers.solve(replace(problem, sharply=True), listener, diagnose=True)
+        return solvers.solve(problem, listener, diagnose=True)
     except SolverError as error:
         return replace(solvers.evaluate_only(problem, allow_resonance=True), status=Status.FAILED, message=str(error))

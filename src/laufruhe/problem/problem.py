@@ -181,8 +181,6 @@ class Problem(Goals, Statements):
         Requests of extensions, at most one of a class.
     origin
         File of the problem; None if it was made or changed in code.
-    sharply
-        True to close a gap within the tolerance further at little cost (P10).
     ranks
         Objectives in order of priority, the first equal to `objective`; empty for a single objective.
     fires_together
@@ -215,7 +213,6 @@ class Problem(Goals, Statements):
     phasing: Phasing | None = None
     extras: tuple[Extra, ...] = ()
     origin: Origin | None = field(default=None, compare=False, repr=False)
-    sharply: bool = False
     ranks: tuple[PriorityLevel, ...] = ()
     fires_together: bool = False
     shown_units: tuple[tuple[str, str], ...] = ()

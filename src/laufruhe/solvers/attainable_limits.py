@@ -186,7 +186,7 @@ def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], re
 
 def _subproblem(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
     # leave out decisions that change no measure of this problem
-    part = problem.changed(objective=objective, limits=limits, ranks=(), sharply=False)
+    part = problem.changed(objective=objective, limits=limits, ranks=())
     if problem.phasing is not None:
         return part
     channels = [measure.channel for measure in part.measures]

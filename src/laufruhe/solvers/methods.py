@@ -56,7 +56,7 @@ from laufruhe.solvers.walk import check_by_walk
 TIME_LIMIT_NOTE = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
 _HERE = "laufruhe.solvers"
-_SOLVE_CONES = imported(f"{_HERE}.cones.unbalances:solve_polished")
+_SOLVE_CONES = imported(f"{_HERE}.cones.unbalances:solve_unbalances")
 _SOLVE_STARS = imported(f"{_HERE}.stars.phasing_solver:solve_phasing")
 _SOLVE_JOINT = imported(f"{_HERE}.mounts.nonlinear:solve_joint")
 

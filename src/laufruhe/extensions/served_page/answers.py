@@ -168,7 +168,7 @@ def settle(source: Source, state: PageState, seconds: float) -> dict[str, Any]:
     """Return the proven optimum of the whole problem, as `laufruhe solve` computes it."""
     began = time.perf_counter()
     tables, problem = _requested(source, state, with_fixed=False)
-    result = solve(replace(problem, sharply=True), time_limit=seconds)
+    result = solve(problem, time_limit=seconds)
     _solved.clear()
     _solved[_solution_key(source, state)] = result
     claim = settled_claim(state.position, result)

@@ -20,7 +20,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.witness import Witness
-from laufruhe.solvers.boxes.search import BoxSearch, divide_boxes
+from laufruhe.solvers.boxes.search import BoxSearch
 from laufruhe.solvers.conclusion import (
     Design,
     ProofData,
@@ -92,9 +92,9 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         pairs = zip(self.problem.decisions, design.design.values, strict=True)
         return np.array([float(value.real) for decision, value in pairs if not decision.is_affine])
 
-    def contains(self, box: S, design: RebalancedDesign) -> bool:
-        """Return True if a design lies in a box."""
-        numbers = self.place(design)
+    def contains_witness(self, box: S) -> bool:
+        """Return True if the best design lies in a box."""
+        numbers = self.place(self.best)
         return bool(np.all(box.lower <= numbers) and np.all(numbers <= box.upper))
 
     def prices(self, _: Design) -> dict[Side, Price]:
@@ -117,9 +117,8 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
         if not isinstance(root, FathomedPart) and first is not None:
-            zero_level = numerical_zero(problem)
-            name = f"boxes of {numbers}"
-            best, bound, boxes = divide_boxes(self, root, first, zero_level, problem.tolerance, maximum, name)
+            self.what = f"boxes of {numbers}"
+            best, bound, boxes = self.search(root, first, numerical_zero(problem), problem.tolerance, maximum)
         timing = {"solve": time.perf_counter() - started}
         if best is None or (math.isinf(bound) and best.design.rank[0]):
             return infeasible_result(problem, initial, self.conflict, timing)

@@ -21,7 +21,6 @@ from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, 
 from laufruhe.prove.witness import thin_box
 from laufruhe.solvers.boxes.box_designs import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.place_boxes import Relaxation
-from laufruhe.solvers.boxes.search import divide_boxes
 from laufruhe.solvers.conclusion import Design, evaluate_design, infeasible_result, values_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
@@ -97,7 +96,8 @@ def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Prop
     if not result.status.has_design or not problem.search.proves:
         return result
     first = RebalancedDesign(evaluate_design(problem, values_of(problem, result), result.final.samples), result)
-    _, bound, _ = divide_boxes(search, root, first, numerical_zero(problem), problem.tolerance, 1, "boxes of places")
+    search.what = "boxes of places"
+    _, bound, _ = search.search(root, first, numerical_zero(problem), problem.tolerance, 1)
     return with_better_bound(result, bound, f"{method} with places at the corners of their bounds")
 
 

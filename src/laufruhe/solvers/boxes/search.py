@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Generic, Protocol, TypeVar
 
-import numpy as np
-
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
 from laufruhe.prove.certificate import gap_of
@@ -45,8 +43,18 @@ B = TypeVar("B", bound=SearchBox)
 D = TypeVar("D", bound=BoxDesign)
 
 
-class BoxSearch(Generic[B, D]):
-    """Boxes and designs of a method."""
+class BoxSearch(BranchAndBound[B], Generic[B, D]):
+    """Branch and bound that stores the best design of all boxes; a subclass states boxes and designs.
+
+    Attributes
+    ----------
+    best
+        Best design so far.
+    """
+
+    best: D
+    _zero_level: float
+    _tolerance: float
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | FathomedPart, D | None]]:
         """Yield parts that together make up a box, each with a design in it, or None.
@@ -56,81 +64,53 @@ class BoxSearch(Generic[B, D]):
         """
         raise NotImplementedError
 
-    def level(self, _: float) -> float:
-        """Return the smallest objective that designs in cut-off boxes may have [SI]; infinite if none is cut off."""
-        return math.inf
-
     def witness_of(self, _: D) -> Witness | None:
         """Return a design as a witness of bounds, or None if it violates limits."""
         raise NotImplementedError
-
-    def contains(self, _box: B, _design: D) -> bool:
-        """Return True if a design lies in a box."""
-        return False
 
     def around(self, _: D) -> B | FathomedPart | None:
         """Return a thin box around a design, with its bound; None if the method builds none."""
         raise NotImplementedError
 
-
-class _Branching(BranchAndBound[B], Generic[B, D]):
-    """Branch and bound that stores the best design of all boxes."""
-
-    def __init__(self, search: BoxSearch[B, D], best: D, zero_level: float, tolerance: float, what: str) -> None:
-        self.what, self.best, self.value = what, best, best.value
-        self.witness = search.witness_of(best)
-        self._search, self._zero_level, self._tolerance = search, zero_level, tolerance
-
-    @property
-    def level(self) -> float:
-        """Smallest objective that designs in cut-off boxes may have [SI]; infinite if none is cut off."""
-        return self._search.level(self.value)
-
-    def contains_witness(self, box: B) -> bool:
-        """Return True if the best design lies in a box."""
-        return self._search.contains(box, self.best)
-
     def is_fathomed(self, node: OpenNode[B]) -> bool:
         """Return True if the gap between a box and the incumbent is closed."""
         gap = gap_of(self.value, node.bound, self._zero_level)
         # the bound of an exact box differs from its best design by no more than the tolerance of its program
-        return gap <= GAP_SAFETY * self._tolerance or (gap < np.inf and node.part.is_exact)
+        return gap <= GAP_SAFETY * self._tolerance or (gap < math.inf and node.part.is_exact)
 
     def branch(self, nodes: Sequence[OpenNode[B]]) -> BoundedParts[B]:
         """Yield the parts of a box with their bounds."""
         ((bound, _, box),) = nodes
-        for part, design in self._search.parts(box, self.value):
+        for part, design in self.parts(box, self.value):
             if design is not None and design.rank < self.best.rank:
-                self.best, self.value, self.witness = design, design.value, self._search.witness_of(design)
+                self.best, self.value, self.witness = design, design.value, self.witness_of(design)
             yield part if isinstance(part, FathomedPart) else (part.bound, part)
             if is_time_over():
                 # the remaining parts have at least the bound of the box
                 yield bound, box
                 return
 
+    def search(self, root: B, best: D, zero_level: float, tolerance: float, maximum: int) -> tuple[D, float, int]:
+        """Search for the best design by dividing boxes until the lowest bound closes the gap to it.
 
-def divide_boxes(
-    search: BoxSearch[B, D], root: B, best: D, zero_level: float, tolerance: float, maximum: int, what: str
-) -> tuple[D, float, int]:
-    """Search for the best design by dividing boxes until the lowest bound closes the gap to it.
+        Parameters
+        ----------
+        root, best
+            Box of all open numbers, and the first incumbent.
+        zero_level, tolerance
+            Objective that counts as zero [SI], and relative gap at which the search ends.
+        maximum
+            Largest number of boxes.
 
-    Parameters
-    ----------
-    root, best
-        Box of all open numbers, and the first incumbent.
-    zero_level, tolerance
-        Objective that counts as zero [SI], and relative gap at which the search ends.
-    maximum, what
-        Largest number of boxes, and their name in progress reports.
-
-    Returns
-    -------
-    The best design, the lower bound of all designs (infinite if none is feasible), and the number of boxes.
-    """
-    boxes = _Branching(search, best, zero_level, tolerance, what)
-    bound = boxes.divide((root.bound, root), maximum)
-    if boxes.witness is not None:
-        thin = search.around(boxes.best)
-        if thin is not None:
-            boxes.witness.check_near(what, thin.level if isinstance(thin, FathomedPart) else thin.bound)
-    return boxes.best, bound, boxes.node_count
+        Returns
+        -------
+        The best design, the lower bound of all designs (infinite if none is feasible), and the number of boxes.
+        """
+        self.best, self.value, self.witness = best, best.value, self.witness_of(best)
+        self._zero_level, self._tolerance = zero_level, tolerance
+        bound = self.divide((root.bound, root), maximum)
+        if self.witness is not None:
+            thin = self.around(self.best)
+            if thin is not None:
+                self.witness.check_near(self.what, thin.level if isinstance(thin, FathomedPart) else thin.bound)
+        return self.best, bound, self.node_count

@@ -115,7 +115,7 @@ class NewtonProgram:
         """Smooth terms with their weights."""
         return [self.problem.terms[k] for k in self.smooth]
 
-    def steps(self, x: Array, directions: Array | None = None) -> Step | None:
+    def steps(self, x: Array, directions: Array) -> Step | None:
         """Return the end of Newton steps from x, shape (n,), and dual rows there; None if no step lowers the objective.
 
         Parameters
@@ -127,7 +127,7 @@ class NewtonProgram:
         cones = self.no_cones
         for _ in range(MAX_STEPS):
             gradient, curvature = self.derivatives(x)
-            if directions is not None and _smallest(directions.T @ curvature @ directions) <= CURVED:
+            if _smallest(directions.T @ curvature @ directions) <= CURVED:
                 return None
             prices = cones.shadow_prices(problem)
             for price, (_, norm) in zip(prices, problem.limits, strict=True):

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import until_time_limit
 from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.dependence import depends
@@ -18,7 +19,7 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.numerical_zero import ROUNDING, numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import ProofStrength, best_bound, gap_of, kkt_residual
+from laufruhe.prove.certificate import Bound, ProofStrength, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     FEASIBLE,
@@ -30,10 +31,8 @@ from laufruhe.solvers.conclusion import (
     smallest_conflicting,
     violated_limits,
 )
-from laufruhe.solvers.cones.cone_program import ConicSolution
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
-from laufruhe.solvers.cones.newton_polish import CONES, NEWTON, REFINEMENT, Optimum, polish
 from laufruhe.solvers.cones.tie_break import break_ties
 from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
@@ -49,6 +48,34 @@ MAX_ROWS = 60_000
 """Number of rows of a term from which the samples are not doubled."""
 
 
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """A design with its lower bound and its violation of limits.
+
+    Attributes
+    ----------
+    x
+        Decision vector, shape (n,).
+    bound
+        Lower bound of all designs, with its multipliers.
+    problem
+        Affine problem, sampled on the grid of the bound.
+    gap
+        Gap between objective and bound, relative to the objective.
+    violation
+        Largest relative excess over a limit, between the samples too.
+    method
+        Method in words for the certificate.
+    """
+
+    x: Array
+    bound: Bound
+    problem: AffineProblem
+    gap: float
+    violation: float
+    method: str
+
+
 def conflict_on_any_mounts(problem: Problem) -> tuple[str, ...]:
     """Return names of limits that contradict each other for every choice of unbalances and mounts; empty if none."""
     limits = tuple(limit for limit in problem.load_limits if not depends(limit.measure.channel, OF_MOUNTS, problem))
@@ -62,18 +89,11 @@ def conflict_on_any_mounts(problem: Problem) -> tuple[str, ...]:
     )
 
 
-def solve_polished(problem: Problem) -> Result:
-    """Solve for unbalances, to a gap of 1e-6 if the problem requests that and the optimum is smooth (P10)."""
-    return solve_unbalances(problem, problem.sharply)
-
-
-def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) -> Result:
+def solve_unbalances(problem: Problem, angles: int = 0) -> Result:
     """Find the global optimum of a problem whose decisions are unbalances.
 
     Parameters
     ----------
-    polished
-        True to narrow the gap of the cone program by Newton's method.
     angles
         Smallest number of samples per cycle of the first program, for example of a similar problem.
 
@@ -91,7 +111,8 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
         return infeasible_result(problem, initial, violated, {"model": model_time - started})
     model = model.with_limits([limit for limit in problem.limits if limit not in fixed])
     start_samples = int(angles * float(problem.engine.cycle.base_order / model.base))
-    optimum, samples = _refine(model.problem, model, numerical_zero(problem), start_samples)
+    zero_level = numerical_zero(problem)
+    optimum, samples = _refine(model.problem, model, zero_level, start_samples)
     solved = time.perf_counter()
     timing = {"model": model_time - started, "solve": solved - model_time}
     limits = model.problem.load_limits
@@ -102,8 +123,6 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
         if not is_infeasible(relaxed):
             return failed_result(problem, initial, names, timing)
         return infeasible_result(problem, initial, smallest_conflict(relaxed, names), timing)
-    if polished:
-        optimum = polish(model, optimum, REFINEMENT * optimum.problem.samples)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = evaluate_design(problem, values, cycle_samples)
@@ -113,7 +132,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
     timing["evaluate"] = time.perf_counter() - solved
     bound = optimum.bound
     prices, bounds = affine_prices(optimum.problem, limits, optimum.x, bound)
-    unit = design.value if design.value > optimum.zero_level else optimum.zero_level / ROUNDING
+    unit = design.value if design.value > zero_level else zero_level / ROUNDING
     proof = ProofData(
         bound=bound.value,
         strength=ProofStrength.EXACT,
@@ -150,10 +169,7 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
     # a limit close to the smallest possible mean needs many samples
     maximum = max(MAX_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
     for k in until_time_limit(range(maximum + 1)):
-        # Newton's method on the grid of the next bound may save the larger program
-        optimum = polish(model, best, 2 * samples) if best is not None else None
-        if optimum is None or optimum is best or optimum.gap > problem.tolerance:
-            optimum = allowed_optimum(problem, model, samples, zero_level)
+        optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
             if _is_feasible(problem, best):
                 return best, samples
@@ -208,7 +224,14 @@ def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_lev
 
 def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: float, margin: float) -> Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
-    solution, proposer = _proposal(tighten_limits(coarse, margin), problem.search.solver)
+    solver, allowed = problem.search.solver, tighten_limits(coarse, margin)
+    if solver:
+        from laufruhe.solvers.cones.cvxpy_program import solve_by_cvxpy
+
+        solution, method = solve_by_cvxpy(allowed, solver), f"second-order cones by {solver}"
+    else:
+        solution = solve_cones(allowed)
+        method = "Newton's method" if solution.by_newton else "second-order cones"
     if solution.x is None:
         return None
     x = break_ties(problem, fine, solution.x)
@@ -217,17 +240,7 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: flo
     has_peaks = any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
     peak_model = model.at(fine.samples, finer=True) if has_peaks else fine
     gap = gap_of(peak_model.objective(x), bound.value, zero_level)
-    return Optimum(x, bound, fine, gap, peak_model.violation(x), samples, zero_level, proposer)
-
-
-def _proposal(affine: AffineProblem, solver: str) -> tuple[ConicSolution, str]:
-    # design with dual rows, and the name of its method
-    if solver:
-        from laufruhe.solvers.cones.cvxpy_program import solve_by_cvxpy
-
-        return solve_by_cvxpy(affine, solver), f"{CONES} by {solver}"
-    solution = solve_cones(affine)
-    return solution, NEWTON if solution.by_newton else CONES
+    return Optimum(x, bound, fine, gap, peak_model.violation(x), f"{method} at {samples} angles")
 
 
 def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:

@@ -25,7 +25,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.prove.witness import Witness, thin_box
-from laufruhe.solvers.boxes.search import BoxSearch, divide_boxes
+from laufruhe.solvers.boxes.search import BoxSearch
 from laufruhe.solvers.conclusion import FEASIBLE, is_sampled, refine_objective
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import ranked_orders
@@ -222,9 +222,7 @@ def search_throws(
     except ModelError:
         return None
     maximum = len(search.roots) + problem.search.boxes_or(MAX_BOXES)
-    incumbent, bound, boxes = divide_boxes(
-        search, _Part(floor), _Best(best), zero_level, search.gap_target, maximum, search.what
-    )
+    incumbent, bound, boxes = search.search(_Part(floor), _Best(best), zero_level, search.gap_target, maximum)
     return ThrowBound(bound, incumbent.design, boxes, search.conflict, search.what)
 
 
@@ -325,8 +323,12 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         orders = ranked_orders(replace(self._phasing, intervals=Intervals(0.0, math.inf)), design)
         return replace(design, firing_order=orders[0].order if orders else None)
 
-    def level(self, value: float) -> float:
-        """Return the smallest objective that designs in cut-off boxes may have, for that of the incumbent [SI]."""
+    @property
+    def level(self) -> float:
+        """Smallest objective that designs in cut-off boxes may have [SI]."""
+        return self._level_below(self.value)
+
+    def _level_below(self, value: float) -> float:
         return value * (1.0 - SHARE * self._problem.tolerance)
 
     def witness_of(self, incumbent: _Best) -> Witness | None:
@@ -359,10 +361,10 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
 
         The parts are the boxes of all firing windows for the root, else the box at more samples, or its halves.
         """
-        box, stage, cutoff = part.box, part.stage, self.level(value)
+        box, stage, cutoff = part.box, part.stage, self._level_below(value)
         if box is None or stage is None:
             for first, window, left_out in self.roots:
-                programs, cutoff = first.programs, self.level(min(value, self._best.value))
+                programs, cutoff = first.programs, self._level_below(min(value, self._best.value))
                 root = programs.box(programs.program(window), *window.box, part.bound, cutoff, reuse_multipliers=True)
                 yield self._examine(first, root, left_out)
         elif stage.is_exhausted(part.bound, value, box) and stage.finer is not None:
