@@ -19,6 +19,7 @@ from laufruhe.files.reader import tables_of
 from laufruhe.numerics.budget import limit_time, seconds_left
 from laufruhe.numerics.cluster import cluster
 from laufruhe.numerics.processes import Processes, WorkerDied
+from laufruhe.numerics.progress import progress_listener
 from laufruhe.numerics.workers import (
     SERIAL,
     SerialExecutor,
@@ -26,6 +27,7 @@ from laufruhe.numerics.workers import (
     WorkersGone,
     current_executor,
     executor_for,
+    ordered_map,
     unordered_map,
     worker_count,
     working_on,
@@ -199,6 +201,13 @@ def test_pieces_are_taken_as_workers_get_free() -> None:
     with ThreadPoolExecutor(2) as pool, closing(unordered_map(power, pieces(), pool)) as found:  # type: ignore[arg-type]
         next(found)
         assert len(taken) <= 12
+
+
+def test_in_turn_keeps_the_order_whoever_works() -> None:
+    told: list[int] = []
+    with ThreadPoolExecutor(3) as pool, working_on(pool), progress_listener(lambda step: told.append(step.done)):
+        assert ordered_map(abs, [-3, -1, -2], "numbers") == [3, 1, 2]
+    assert told == [0, 1, 2]
 
 
 def test_without_dask_the_option_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

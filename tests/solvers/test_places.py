@@ -14,8 +14,6 @@ from scipy.optimize import minimize
 import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.machine import Engine
-from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
@@ -366,22 +364,3 @@ def test_distances_of_what_is_not_there_are_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=said):
             _problem(tmp_path, _engine() + f"[[constraints]]\n{limit}\n")
-
-
-@pytest.mark.slow
-def test_workers_change_no_bit(tmp_path: Path) -> None:
-    """Boxes that others have worked out ahead are taken in the order of one process."""
-    whole = "angle = { between = [0, 360] }"
-    text = HEIGHTS.read_text(encoding="utf-8")
-    text = text.replace("angle = 180", whole).replace('"0.05 kg m"', '"0.02 kg m"')
-    text += "\n[search]\nboxes = 2\n[fidelity]\nsamples = 96\n"
-    problem = _problem(tmp_path, text)
-    with working_on(SERIAL):
-        alone = laufruhe.solve(problem)
-    with Processes(2) as pool, working_on(pool):
-        shared = laufruhe.solve(problem)
-    assert alone.certificate is not None
-    assert "over 3 boxes" in alone.certificate.method
-    assert shared.certificate == alone.certificate
-    assert shared.decisions == alone.decisions
-    assert shared.objective == alone.objective

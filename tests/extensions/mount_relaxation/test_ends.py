@@ -1,6 +1,5 @@
-"""Ends of sides that others work out ahead: to the last bit those of one process."""
+"""Ends of sides of boxes: those of their own program and box, whatever was bounded before."""
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,30 +8,10 @@ import pytest
 
 from extensions.mount_relaxation.test_mode_boxes import NEAR, decoupled, designs_about
 from extensions.mount_relaxation.test_spring_bound import DAMPED, LIMITS, MEANS, asked_for
-from laufruhe.extensions.mount_relaxation.cone_program import ROUGH, ConeProgram, Objectives, bounds_ahead
-from laufruhe.extensions.mount_relaxation.prover import _Narrowing, narrowed, spring_bound
+from laufruhe.extensions.mount_relaxation.cone_program import ROUGH, ConeProgram
+from laufruhe.extensions.mount_relaxation.prover import _Narrowing
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
-from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
-
-
-@pytest.mark.slow
-def test_whoever_works_them_out() -> None:
-    problem = decoupled(3)
-    best, minimum = min(designs_about(problem, NEAR[:3], 30), key=lambda pair: pair[1])
-    found = []
-    with ThreadPoolExecutor(3) as pool:
-        for executor in (SERIAL, pool):
-            with working_on(executor), bounds_ahead() as ahead:
-                boxes = SdpRelaxation(problem, 1.02 * minimum, 1e-3, best.tolist(), ahead)
-                box, solved = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
-                assert box is not None
-                found.append((box, solved, spring_bound(problem, minimum, 0.1 * minimum, best.tolist()).bound))
-                # those that are asked for are foreseen, though some are not asked for any more
-                assert (ahead.hits > solved // 2) == (executor is pool)
-    (box, solved, bound), (other, counted, proven) = found
-    assert np.array_equal(box, other)
-    assert (solved, bound) == (counted, proven)
 
 
 @pytest.mark.slow
@@ -45,7 +24,7 @@ def test_aims_are_those_of_their_own_program_and_box() -> None:
     boxes.bound(boxes.lower, middle)
     half, whole = (boxes.cut_off(boxes.lower, upper)[0] for upper in (middle, boxes.upper))
     aim = np.eye(whole.numbers + 5 * len(boxes.modes))[0]
-    found = [Objectives(program, None).bound(0, aim)[0] for program in (whole, half, whole)]
+    found = [ConeProgram(program, ROUGH).minimum(aim)[0] for program in (whole, half, whole)]
     alone = [
         ConeProgram(program, ROUGH).minimum(aim)[0] for program in (anew.cut_off(boxes.lower, boxes.upper)[0], half)
     ]

@@ -1,13 +1,11 @@
-"""Cone programs for Clarabel, scaled, and solved as primal or dual program.
+"""Cone programs for Clarabel, scaled, and solved as dual programs.
 
     minimum q'x   with   b - A x in K,   the matrices X_k of x positive semidefinite
     minimum b'z   with   A_o' z = -q_o,   q_k + A_k' z positive semidefinite for each X_k,   z in the dual of K
 
-K is a product of cones. A_k are the columns of X_k, A_o all others: X_k and x_o are multipliers of the second program.
-In the first program an entry of X_k is a column and a row of the solver, in the second a row; rows of all other cones
-are columns and rows of the second. The program is chosen in which the larger matrices take less space. Both are scaled
-like the first: rows and columns by the roots of their largest entries, repeatedly (Ruiz, RAL-TR-2001-034), rows of one
-cone alike.
+K is a product of cones. A_k are the columns of X_k, A_o all others: X_k and x_o are multipliers of the second program,
+which stores the matrices X_k once. Both are scaled alike: rows and columns by the roots of their largest entries,
+repeatedly (Ruiz, RAL-TR-2001-034), rows of one cone alike.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, diags_array, eye_array, vstack
+from scipy.sparse import csc_array, diags_array, eye_array, vstack
 
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.budget import is_time_over
@@ -40,40 +38,26 @@ class ConeSolver:
         Columns of each X_k; at least one.
     settings
         Settings of Clarabel.
-    is_dual
-        True to solve the second program, False for the first; by default the one that stores the larger cones once: the
-        matrices X_k, or the cones with one scale.
     """
 
     def __init__(
         self, rows: Any, right: Array, cones: Sequence[tuple[str, int]], matrices: Sequence[Indices],
-        settings: Mapping[str, Any], is_dual: bool | None = None,
+        settings: Mapping[str, Any],
     ) -> None:  # fmt: skip
-        if is_dual is None:
-            matrix_size = sum(len(columns) ** 2 for columns in matrices)
-            is_dual = matrix_size >= sum(count**2 for kind, count in cones if kind in (LENGTH, MATRIX))
-        self.is_dual = is_dual
         self._settings = {**settings, "equilibrate_enable": False}
         self._row_scales, self._column_scales = _scales(rows, cones, matrices)
         scaled_rows = csc_array(diags_array(self._row_scales) @ rows @ diags_array(self._column_scales))
         self._right = self._row_scales * right
         entries, (count, width) = np.concatenate(matrices), rows.shape
-        kinds = [(MATRIX, len(columns)) for columns in matrices]
-        if is_dual:
-            free_count = width - len(entries)
-            self._order = np.concatenate([np.setdiff1d(np.arange(width), entries), entries])
-            self._signs = np.where(np.arange(width) < free_count, 1.0, -1.0)
-            inequality_rows = np.flatnonzero(
-                np.repeat([kind != ZERO for kind, _ in cones], [size for _, size in cones])
-            )
-            transposed = diags_array(self._signs) @ scaled_rows[:, self._order].T
-            added: Any = -eye_array(count, format="csr")[inequality_rows]
-            self._rows = csc_array(vstack([transposed, added]))
-            kinds = [(ZERO, free_count), *kinds, *(cone for cone in cones if cone[0] != ZERO)]
-        else:
-            added = coo_array((-np.ones(len(entries)), (np.arange(len(entries)), entries)), (len(entries), width))
-            self._rows = csc_array(vstack([scaled_rows, added]))
-            kinds = [*cones, *kinds]
+        free_count = width - len(entries)
+        self._order = np.concatenate([np.setdiff1d(np.arange(width), entries), entries])
+        self._signs = np.where(np.arange(width) < free_count, 1.0, -1.0)
+        inequality_rows = np.flatnonzero(np.repeat([kind != ZERO for kind, _ in cones], [size for _, size in cones]))
+        transposed = diags_array(self._signs) @ scaled_rows[:, self._order].T
+        added: Any = -eye_array(count, format="csr")[inequality_rows]
+        self._rows = csc_array(vstack([transposed, added]))
+        kinds = [(ZERO, free_count), *((MATRIX, len(columns)) for columns in matrices)]
+        kinds += [cone for cone in cones if cone[0] != ZERO]
         self._cones = [clarabel_cone(*cone) for cone in kinds]
         self._zeros = np.zeros(added.shape[0])
         self._solver: Any = None
@@ -84,21 +68,16 @@ class ConeSolver:
         size = float(np.abs(scaled).max(initial=0.0))
         factor = float(np.clip(1.0 / size, _MIN_SCALE, _MAX_SCALE)) if size > 0.0 else 1.0
         scaled = factor * scaled
-        if self.is_dual:
-            vectors = {"q": self._right, "b": np.append(-self._signs * scaled[self._order], self._zeros)}
-        else:
-            vectors = {"q": scaled, "b": np.append(self._right, self._zeros)}
+        vectors = {"q": self._right, "b": np.append(-self._signs * scaled[self._order], self._zeros)}
         if self._solver is None:
             self._solver = new_solver(vectors["q"], self._rows, vectors["b"], self._cones, self._settings)
         else:
             self._solver.update(**vectors)
         solution = self._solver.solve()
-        x, z = (np.nan_to_num(np.array(values)) for values in (solution.x, solution.z))
-        if self.is_dual:
-            entries = np.empty(len(cost))
-            entries[self._order] = -self._signs * z[: len(cost)]
-            x, z = entries, x
-        return self._column_scales * x, self._row_scales * z[: len(self._right)] / factor
+        z, x = (np.nan_to_num(np.array(values)) for values in (solution.x, solution.z))
+        entries = np.empty(len(cost))
+        entries[self._order] = -self._signs * x[: len(cost)]
+        return self._column_scales * entries, self._row_scales * z / factor
 
 
 def new_solver(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:
