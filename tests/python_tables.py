@@ -18,7 +18,7 @@ import laufruhe
 from laufruhe.files.engine import EngineTable
 from laufruhe.machine.drives import DRIVES
 from laufruhe.machine.layouts import LAYOUTS
-from laufruhe.python.keys import NAMES, alternatives, description
+from laufruhe.python.keys import NAMES, alternatives
 from schemas import problem_schema
 
 PACKAGE = Path(laufruhe.__file__).parent
@@ -27,7 +27,6 @@ PARTS, TABLES, LAYOUT_CALLS, GOALS = (
 )
 TEXTS = ("title", "source", "assumptions", "tolerance")
 """Keys of the file that are arguments of `laufruhe.problem`."""
-WITHIN = "Share by which the objective before this one may exceed its least value."
 GOAL_KEYS = ("objective", "constraints")
 WIDTH = 120
 MADE = "`python tests/schemas.py` makes this file of the models of problem files."
@@ -111,10 +110,10 @@ class Call:
 
     def __init__(
         self, name: str, summary: str, table: Entry, returns: str, body: str, *, first: str = "", method: bool = False,
-        fixed: Mapping[str, Any] | None = None, required: frozenset[str] = frozenset(), documents: bool = False,
+        fixed: Mapping[str, Any] | None = None, required: frozenset[str] = frozenset(),
     ) -> None:  # fmt: skip
         self.name, self.summary, self.returns, self.body, self.method = name, summary, returns, body, method
-        self.first, self.table, self.documents = first, table, documents
+        self.first, self.table = first, table
         self.keys = {key: entry for key, entry in table["properties"].items() if key not in (fixed or {})}
         self.required = required or frozenset(table.get("required", ()))
 
@@ -134,13 +133,7 @@ class Call:
         if len(head) > WIDTH:
             head = f"{indent}def {self.name}(\n{packed(signature, f'{indent}    ')}\n{indent}) -> {self.returns}:"
         doc = f'{indent}    """{self.summary}'
-        if self.documents:
-            doc += f"\n\n{indent}    Parameters\n{indent}    ----------"
-            for key in ([self.first] if self.first else []) + needed + others:
-                words = description(schema(), self.keys[key]).replace("\\", "\\\\")
-                doc += f"\n{indent}    {argument(key)}\n" + wrapped(words, f"{indent}        ")
-            doc += f"\n{indent}    "
-        elif len(doc) + 3 > WIDTH:
+        if len(doc) + 3 > WIDTH:
             summary, _, more = self.summary.partition(". ")
             doc = f'{indent}    """{summary}.\n\n' + wrapped(more, indent + "    ") + f"\n{indent}    "
         return f'{head}\n{doc}"""\n{indent}    return {self.body}\n'
@@ -262,22 +255,21 @@ def goals_module() -> str:
         f"QuantityName: TypeAlias = Literal[\n{packed([quoted(name) for name in names], '    ')}\n] | str\n"
         '"""Quantities that may be minimised or limited; those of extensions of users are texts."""\n\n\n'
     )
-    within = {**objective["properties"]["within"], "description": WITHIN}
-    further = {**objective, "properties": {**objective["properties"], "within": within}}
     replaces = "Return the problem with this objective, in place of earlier ones."
-    follows = "Return the problem with one more objective, among the designs that are best by earlier ones."
+    follows = "Return the problem with one more objective, among the designs that are best by earlier ones. "
+    follows += "`within` is the share by which the objective before this one may exceed its least value."
     calls = [
         Call(
             "minimise", replaces, objective, "Self", 'self._with_goal("objective", locals(), False)', first="minimise",
-            method=True, fixed={"within": None}, documents=True,
+            method=True, fixed={"within": None},
         ),
         Call(
-            "then_minimise", follows, further, "Self", 'self._with_goal("objective", locals(), True)', first="minimise",
-            method=True, documents=True,
+            "then_minimise", follows, objective, "Self", 'self._with_goal("objective", locals(), True)',
+            first="minimise", method=True,
         ),
         Call(
             "limit", "Return the problem with one more limit.", limit, "Self",
-            'self._with_goal("constraints", locals(), True)', first="limit", method=True, documents=True,
+            'self._with_goal("constraints", locals(), True)', first="limit", method=True,
         ),
     ]  # fmt: skip
     head = (

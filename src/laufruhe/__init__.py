@@ -59,7 +59,7 @@ _LAYOUTS = ("boxer", "delta", "engine", "inline", "opposed_piston", "parts", "ra
 _ELSEWHERE = {
     "EngineDraft": "laufruhe.python.draft",
     "own_measure": "laufruhe.problem.own_measures",
-    "Problem": "laufruhe.problem.problem",
+    "Problem": "laufruhe.python.draft",
     "Result": "laufruhe.python.results",
     **dict.fromkeys(("Progress", "ProgressLine"), "laufruhe.python.watch"),
     **dict.fromkeys(_LAYOUTS, "laufruhe.python.layouts"),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -152,7 +152,7 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     check_integer("steps", steps, 1, MAX_STEPS)
     first = next(iter(designs.values()))
     cycle, fields = first.engine.cycle, []
-    for name, words, unit, axes, signal, part in _signals(first, _WRENCH):
+    for name, words, unit, axes, signal, part in _signals(first):
         spectra = [[with_common_base(cycle.base_order, [signal(x)])[0] for x in d.loads] for d in designs.values()]
         values = np.array([[spectrum.sample(steps) for spectrum in row] for row in spectra])[..., part]
         fields.append(_vector_field(name, words, unit, axes, values))
@@ -163,37 +163,29 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
 
 def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
     """Return the amplitudes by order of the loads on block, mounts and bearings (C8)."""
+    return _amplitudes(harmonics_of(designs))
 
-    def amplitudes(name: str, words: str, unit: str, axes: tuple[CurveAxis, ...], series: ComplexArray) -> Field:
+
+def _amplitudes(harmonics: Fields) -> Fields:
+    force, moment, *places, _ = harmonics.fields
+    parts = (replace(moment, name=name.replace(" ", "_"), words=name, values=moment.values[..., part])
+             for name, part in _MOMENTS)  # fmt: skip
+    fields = []
+    for field in (force, moment, *parts, *places):
+        is_vector = _is_vector(field)
         # a resonance has no finite amplitude
         with np.errstate(invalid="ignore"):
-            values = order_amplitude(series)
-        return Field(name, words, unit, axes, np.where(np.isfinite(values), values, math.inf))
-
-    return _by_order("Amplitudes by order", designs, (*_WRENCH, *_MOMENTS), amplitudes)
+            values = order_amplitude(field.values if is_vector else field.values[..., None])
+        values = np.where(np.isfinite(values), values, math.inf)
+        fields.append(replace(field, own_axes=field.own_axes[:-1] if is_vector else field.own_axes, values=values))
+    return replace(harmonics, title="Amplitudes by order", fields=tuple(fields))
 
 
 def harmonics_of(designs: Mapping[str, Evaluation]) -> Fields:
     """Return the complex coefficients c by order h of the same loads: f(phi) = Re sum c e^{i h phi} (C8)."""
-    harmonics = _by_order("Complex coefficients by order", designs, _WRENCH, _vector_field)
-    speeds = np.array([loads.point.speed for loads in next(iter(designs.values())).loads])
-    frequencies = np.outer(speeds, harmonics.rows[1].labels) / math.tau
-    return replace(
-        harmonics,
-        fields=(*harmonics.fields, Field("frequency", "frequency", "Hz", (), np.array([frequencies] * len(designs)))),
-    )
-
-
-def _by_order(
-    title: str,
-    designs: Mapping[str, Evaluation],
-    parts: Sequence[tuple[str, str, slice]],
-    field_of: Callable[[str, str, str, tuple[CurveAxis, ...], ComplexArray], Field],
-) -> Fields:
-    """Return fields of complex coefficients, which `field_of` takes in shape (designs, points, orders, ...)."""
     first = next(iter(designs.values()))
     base = common_base([loads.wrench.base for design in designs.values() for loads in design.loads])
-    signals = list(_signals(first, parts))
+    signals = list(_signals(first))
     spectra = [
         [[signal(loads).with_finer_base(base) for loads in design.loads] for design in designs.values()]
         for *_, signal, _ in signals
@@ -204,12 +196,16 @@ def _by_order(
         return np.pad(series, [(0, count - len(series))] + [(0, 0)] * (series.ndim - 1))
 
     fields = [
-        field_of(name, words, unit, axes, np.array([[padded(s.coefficients[..., part]) for s in row] for row in rows]))
+        _vector_field(
+            name, words, unit, axes, np.array([[padded(s.coefficients[..., part]) for s in row] for row in rows])
+        )
         for (name, words, unit, axes, _, part), rows in zip(signals, spectra, strict=True)
     ]
     orders = CurveAxis("order", tuple(float(k * base) for k in range(count)))
     points = CurveAxis("point", tuple(loads.point.name for loads in first.loads))
-    return Fields(title, CurveAxis("design", tuple(designs)), (points, orders), tuple(fields))
+    frequencies = np.outer([loads.point.speed for loads in first.loads], orders.labels) / math.tau
+    fields.append(Field("frequency", "frequency", "Hz", (), np.array([frequencies] * len(designs))))
+    return Fields("Complex coefficients by order", CurveAxis("design", tuple(designs)), (points, orders), tuple(fields))
 
 
 def _vector_field(name: str, words: str, unit: str, axes: tuple[CurveAxis, ...], values: Any) -> Field:
@@ -219,24 +215,26 @@ def _vector_field(name: str, words: str, unit: str, axes: tuple[CurveAxis, ...],
     return Field(name, words, unit, (*axes, CurveAxis("direction", ("x", "y", "z"))), values)
 
 
+def _is_vector(field: Field) -> bool:
+    return any(axis.name == "direction" for axis in field.own_axes)
+
+
 def orders_with_phases(designs: Mapping[str, Evaluation]) -> Fields:
-    """Return the fields of `orders_of`, the frequency [Hz], and amplitude and phase [deg] of every component.
+    """Return the fields of `orders_of`, amplitude and phase [deg] of every component, and the frequency [Hz].
 
     A component is its amplitude times the cosine of order times crank angle plus phase.
     """
-    orders, fields = orders_of(designs), list[Field]()
-    for field in harmonics_of(designs).fields:
-        if field.name == "frequency":
-            fields.append(field)
-        elif field.own_axes and field.own_axes[-1].name == "direction":
-            # a resonance has no finite amplitude
-            sizes = np.where(np.isfinite(field.values), np.abs(field.values), math.inf)
-            phases = np.degrees(np.angle(np.where(sizes > 0.0, field.values, 1.0)))
-            fields.append(
-                Field(f"{field.name}_amplitude", f"amplitude of {field.words}", field.unit, field.own_axes, sizes)
-            )
-            fields.append(Field(f"{field.name}_phase", f"phase of {field.words}", "deg", field.own_axes, phases))
-    return replace(orders, fields=(*orders.fields, *fields))
+    harmonics = harmonics_of(designs)
+    orders, fields = _amplitudes(harmonics), list[Field]()
+    for field in filter(_is_vector, harmonics.fields):
+        # a resonance has no finite amplitude
+        sizes = np.where(np.isfinite(field.values), np.abs(field.values), math.inf)
+        phases = np.degrees(np.angle(np.where(sizes > 0.0, field.values, 1.0)))
+        fields.append(replace(field, name=f"{field.name}_amplitude", words=f"amplitude of {field.words}", values=sizes))
+        fields.append(
+            replace(field, name=f"{field.name}_phase", words=f"phase of {field.words}", unit="deg", values=phases)
+        )
+    return replace(orders, fields=(*orders.fields, *fields, harmonics.fields[-1]))
 
 
 def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
@@ -271,12 +269,12 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
 _Signal: TypeAlias = tuple[str, str, str, tuple[CurveAxis, ...], Callable[[PointLoads], Spectrum], slice]
 """Name, words, unit, axis of places, spectrum of a load at an operating point, and its components."""
 _WRENCH = (("shaking force", "N", slice(0, 3)), ("shaking moment", "N m", slice(3, 6)))
-_MOMENTS = (("roll moment", "N m", slice(3, 4)), ("rocking couple", "N m", slice(4, 6)))
+_MOMENTS = (("roll moment", slice(0, 1)), ("rocking couple", slice(1, 3)))
 
 
-def _signals(design: Evaluation, parts: Sequence[tuple[str, str, slice]]) -> Iterator[_Signal]:
+def _signals(design: Evaluation) -> Iterator[_Signal]:
     # parts of the wrench, then each load with several places
-    for words, unit, part in parts:
+    for words, unit, part in _WRENCH:
         yield words.replace(" ", "_"), words, unit, (), lambda loads: loads.wrench, part
     places: list[tuple[str, str, str, LoadChannel]] = []
     if design.engine.mounts:

@@ -95,44 +95,7 @@ class Goals(ABC):
         motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
         wanted: Number | None = None, frequency: Value | None = None, terms: Sequence[Table] | None = None,
     ) -> Self:
-        """Return the problem with this objective, in place of earlier ones.
-
-        Parameters
-        ----------
-        minimise
-            What is to be least.
-        mounts
-            Names of the mounts that count; all by default.
-        bearings
-            Names of the main bearings that count; all by default.
-        cylinders
-            Names of the cylinders that count; all by default.
-        sections
-            Sections of the crankshaft that count, named after the discs that they join; all by default.
-        webs
-            Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
-        receivers
-            Receivers that count, by name; all by default.
-        operating_points
-            Names of the operating points that count; all by default.
-        orders
-            Orders that count, as multiples of crank speed; all by default.
-        alternating
-            Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no
-            part.
-        direction_weights
-            Weights of the components along x, y and z.
-        load_cases
-            Load cases that count, by name; all by default.
-        motions
-            Motions that should have a mode of their own; all by default.
-        wanted
-            Share of a motion in a mode of its own that is enough; 1 by default.
-        frequency
-            Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out [Hz].
-        terms
-            Weighted quantities whose sum is to be least.
-        """
+        """Return the problem with this objective, in place of earlier ones."""
         return self._with_goal("objective", locals(), False)
 
     def then_minimise(
@@ -148,43 +111,7 @@ class Goals(ABC):
     ) -> Self:
         """Return the problem with one more objective, among the designs that are best by earlier ones.
 
-        Parameters
-        ----------
-        minimise
-            What is to be least.
-        mounts
-            Names of the mounts that count; all by default.
-        bearings
-            Names of the main bearings that count; all by default.
-        cylinders
-            Names of the cylinders that count; all by default.
-        sections
-            Sections of the crankshaft that count, named after the discs that they join; all by default.
-        webs
-            Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
-        receivers
-            Receivers that count, by name; all by default.
-        operating_points
-            Names of the operating points that count; all by default.
-        orders
-            Orders that count, as multiples of crank speed; all by default.
-        alternating
-            Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no
-            part.
-        direction_weights
-            Weights of the components along x, y and z.
-        load_cases
-            Load cases that count, by name; all by default.
-        motions
-            Motions that should have a mode of their own; all by default.
-        wanted
-            Share of a motion in a mode of its own that is enough; 1 by default.
-        frequency
-            Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out [Hz].
-        terms
-            Weighted quantities whose sum is to be least.
-        within
-            Share by which the objective before this one may exceed its least value.
+        `within` is the share by which the objective before this one may exceed its least value.
         """
         return self._with_goal("objective", locals(), True)
 
@@ -199,50 +126,5 @@ class Goals(ABC):
         min: Number | None = None, outside: Values | None = None, name: str | None = None,
         of: Sequence[str] | None = None,
     ) -> Self:
-        """Return the problem with one more limit.
-
-        Parameters
-        ----------
-        limit
-            What is limited.
-        mounts
-            Names of the mounts that count; all by default.
-        bearings
-            Names of the main bearings that count; all by default.
-        cylinders
-            Names of the cylinders that count; all by default.
-        sections
-            Sections of the crankshaft that count, named after the discs that they join; all by default.
-        webs
-            Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ...
-        receivers
-            Receivers that count, by name; all by default.
-        operating_points
-            Names of the operating points that count; all by default.
-        orders
-            Orders that count, as multiples of crank speed; all by default.
-        alternating
-            Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no
-            part.
-        direction_weights
-            Weights of the components along x, y and z.
-        load_cases
-            Load cases that count, by name; all by default.
-        motions
-            Motions that should have a mode of their own; all by default.
-        wanted
-            Share of a motion in a mode of its own that is enough; 1 by default.
-        frequency
-            Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out [Hz].
-        max
-            Largest value allowed, in the unit of the quantity.
-        min
-            Smallest value allowed, of natural frequencies, decoupling, sag or distance.
-        outside
-            Band in which no natural frequency or critical speed may lie.
-        name
-            Name in tables, pictures and messages.
-        of
-            Names of the counterweights or balancers whose mass counts, or of shafts.
-        """
+        """Return the problem with one more limit."""
         return self._with_goal("constraints", locals(), True)

@@ -15,13 +15,16 @@ from laufruhe.files.nested import plain
 from laufruhe.files.python_numbers import written
 from laufruhe.files.reader import DEEPEST, load_tables, tables_and_path
 from laufruhe.files.toml_text import toml_text
-from laufruhe.problem.goals import QuantityName
+from laufruhe.problem.goals import Goals, QuantityName
 from laufruhe.problem.number_types import Number, Table
 from laufruhe.problem.problem import Problem
-from laufruhe.python.keys import keys_of
+from laufruhe.python.keys import describe, keys_of
 from laufruhe.python.parts import EngineParts
 
 _IN_CODE = "engine in code"
+_GOALS = {"minimise": "ObjectiveTable", "then_minimise": "ObjectiveTable", "limit": "ConstraintTable"}
+for _name, _table in _GOALS.items():
+    describe({"__module__": Goals.__module__, _name: vars(Goals)[_name]}, _table)
 
 
 class EngineDraft(EngineParts, Mapping[str, Any]):

@@ -63,16 +63,18 @@ def _schema() -> dict[str, Any]:
 def describe(calls: Mapping[str, Any], title: str = "") -> None:
     """Add the keys of tables of the schema to the docstrings of the functions of a module or class.
 
-    A function has the keys of the table `title` as arguments, by default those of the table of its own name.
+    A function has the keys of the table `title` as arguments, by default those of the table of its own name. A key that
+    the docstring names in `marks` is left as it is.
     """
     home = calls.get("__name__") or calls["__module__"]
     for function, call in calls.items():
         if inspect.isfunction(call) and call.__module__ == home:
             table = title or "".join(map(str.capitalize, function.removeprefix("gas_").split("_"))) + "Table"
             entries = _schema()["definitions"][table]["properties"]
-            lines = [inspect.cleandoc(call.__doc__ or ""), "", "Parameters", "----------"]
+            text = inspect.cleandoc(call.__doc__ or "")
+            lines = [text, "", "Parameters", "----------"]
             for name in inspect.signature(call).parameters:
-                if name != "self":
+                if name != "self" and f"`{name}`" not in text:
                     words = description(_schema(), entries[NAMES.get(name, name)])
                     lines += [name, textwrap.indent(textwrap.fill(words, 112), "    ")]
             call.__doc__ = "\n".join(lines)
