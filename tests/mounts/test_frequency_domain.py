@@ -24,7 +24,6 @@ from laufruhe.physics.modes import (
 )
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.mount_numbers import torque_roll_coupling
-from laufruhe.physics.mounting import mount_maps
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import speed_map, split_loads
 from laufruhe.problem.channels import mounting_in
@@ -390,16 +389,3 @@ def test_a_map_of_speeds_is_the_single_calls_side_by_side(tmp_path):
         dynamic = field.orders > 0.0
         over, under = (np.linalg.norm(values[k, dynamic]) for values in (field.forces, field.firm))
         assert over / under == pytest.approx(whole, rel=1e-6)
-
-
-@pytest.mark.parametrize("order", [0.0, 1.0, 2.5])
-def test_maps_of_one_order_are_the_forces_of_unit_wrenches(order):
-    mounting = powertrain(loss=0.1, damping=20.0)
-    generator = np.random.default_rng(0)
-    load = generator.normal(size=6) + 1j * generator.normal(size=6)
-    spectrum = Spectrum(Fraction(1, 2), np.zeros((6, 6), dtype=complex))
-    spectrum.coefficients[int(2 * order)] = load
-    expected = mounting.forces(spectrum, 60.0).at(order)
-    assert mount_maps(mounting, order, 60.0) @ load == pytest.approx(expected, rel=1e-10)
-    rigid = rigid_mounting(mounting.mounts)
-    assert mount_maps(rigid, order, 60.0) @ load == pytest.approx(rigid.maps @ load)

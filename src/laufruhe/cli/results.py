@@ -14,7 +14,7 @@ from laufruhe.report import files
 from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
 from laufruhe.report.tables import write_tables
-from laufruhe.report.web_page import as_html, template
+from laufruhe.report.web_page import template, write_pages
 from laufruhe.solvers.result import Result, Status
 from laufruhe.units import shown_in
 
@@ -42,8 +42,7 @@ def write_results(
             import_module("laufruhe.report.screen")
         pictures = wait_for_pictures()
     document = document.showing(pictures)
-    files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
-    files.write(stage / files.PAGE, as_html(document, pictures, page_model))
+    write_pages(stage, document, pictures, f".{request.kinds[0]}" if request.kinds else "", page_model)
     text = as_json(result, request.series)
     for place in filter(None, (stage / files.RESULT, copy)):
         files.write(place, text)

@@ -11,8 +11,8 @@ import typer
 
 from laufruhe.cli.check import warn
 from laufruhe.cli.drawing import drawing
-from laufruhe.cli.screen import DONE, FAILED, Request, Watched, json_file, progress, share_below_one, timed
-from laufruhe.errors import SolverError, counted
+from laufruhe.cli.screen import DONE, FAILED, Request, Watched, complain, json_file, progress, share_below_one, timed
+from laufruhe.errors import SolverError, counted, printed
 from laufruhe.files.reader import load
 from laufruhe.numerics.progress import Listener
 from laufruhe.problem.problem import Problem
@@ -57,6 +57,15 @@ def run(request: Request, answer: Answer) -> None:
         write_results(request, result, stage, copy, wait_for_pictures, say)
     show(request, result, folder)
     raise typer.Exit(DONE if result.status.has_design else FAILED)
+
+
+def designed(problem: Problem, path: Path, initial: bool, say: Callable[[str], None]) -> Result:
+    """Return the decided design, or the initial one; complain and exit if there is none."""
+    result = (evaluate if initial else solve)(problem, Watched(say, problem.objective_unit or ""))
+    if not result.status.has_design:
+        complain(f"{printed(str(path))}: {result.status}: {result.message}")
+        raise typer.Exit(FAILED)
+    return result
 
 
 def evaluate(problem: Problem, _: Listener) -> Result:

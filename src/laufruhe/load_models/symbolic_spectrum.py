@@ -43,14 +43,6 @@ class SymbolicSpectrum:
         m = ca.DM(matrix.copy())
         return SymbolicSpectrum(self.orders, m @ self.real, m @ self.imaginary)
 
-    def map_orders(self, matrices: Sequence[NDArray[np.complex128]]) -> SymbolicSpectrum:
-        """Return the spectrum with each order multiplied by its own complex matrix, shape (m, d) each."""
-        pairs = [(ca.DM(m.real.copy()), ca.DM(m.imag.copy())) for m in matrices]
-        columns = [(self.real[:, k], self.imaginary[:, k]) for k in range(len(pairs))]
-        real = [a @ x - b @ y for (a, b), (x, y) in zip(pairs, columns, strict=True)]
-        imaginary = [a @ y + b @ x for (a, b), (x, y) in zip(pairs, columns, strict=True)]
-        return SymbolicSpectrum(self.orders, ca.horzcat(*real), ca.horzcat(*imaginary))
-
 
 def cosines_and_sines(orders: Sequence[float], base: float, samples: int) -> tuple[Any, Any]:
     """Return cosines and sines of orders at equal steps over the period of order `base`, shape (n, samples) each."""

@@ -6,9 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
-from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -39,17 +37,6 @@ def travel_of(engine: Engine, mounting: Mounting | None, wrench: Spectrum, speed
     if isinstance(mounting, ElasticMounting | TimeMounting):
         return mounting.travel(wrench, speed)
     return Spectrum(wrench.base, np.zeros((1, len(engine.mounts), 3), dtype=complex))
-
-
-def mount_maps(mounting: Mounting, order: float, speed: float) -> ComplexArray:
-    """Return the matrices from a wrench on the engine to its mount forces, at one order and speed, (mounts, 3, 6)."""
-    if isinstance(mounting, RigidMounting):
-        return mounting.maps.astype(complex)
-    if not isinstance(mounting, ElasticMounting):
-        raise ModelError(NO_MAP)
-    omegas = np.full(6, order * speed)
-    forces = mounting.mount_forces(omegas, mounting.responses(omegas, np.eye(6, dtype=complex)))
-    return np.asarray(np.moveaxis(forces, 0, 2))
 
 
 NO_MAP = "mounts in the time domain are evaluated, not solved for; leave fidelity.mounts out and solve again"

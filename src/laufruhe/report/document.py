@@ -5,11 +5,12 @@ A document is assembled once. Every block writes itself as Markdown; `web_page` 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 from laufruhe.present.tables import Table, escape_markdown
+from laufruhe.report.strict_json import made_with
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,19 @@ class Code:
 
 
 Block: TypeAlias = Heading | Paragraph | Bullets | Illustration | Code | Table
+
+
+def sources(source: str, assumptions: Sequence[str]) -> Iterator[Block]:
+    """Yield the blocks about the source of a file and about its assumptions, if it has them."""
+    if source:
+        yield Paragraph(f"Source: {source}.")
+    if assumptions:
+        yield Bullets("Assumptions:", assumptions)
+
+
+def reproduction(command: str) -> tuple[Block, ...]:
+    """Return the last blocks of a report: the command that makes it again, and the versions that made it."""
+    return Heading("Reproduce"), Code(command), Paragraph(made_with())
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from laufruhe.present.pictures import PICTURES
-from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
+from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph, sources
 from laufruhe.report.inputs import input_tables
 from laufruhe.report.sections import tables_of
 from laufruhe.report.strict_json import made_with
@@ -20,10 +20,7 @@ def result_document(result: Result, pictures: Sequence[str], command: str) -> Do
 
 def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[Block]:
     problem = result.problem
-    if problem.source:
-        yield Paragraph(f"Source: {problem.source}.")
-    if problem.assumptions:
-        yield Bullets("Assumptions:", problem.assumptions)
+    yield from sources(problem.source, problem.assumptions)
     if problem.plausibility_warnings:
         yield Bullets("Numbers to check:", [str(warning) for warning in problem.plausibility_warnings])
     yield Heading("Result")

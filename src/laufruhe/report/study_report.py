@@ -13,7 +13,7 @@ from laufruhe.report import files
 from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
 from laufruhe.report.strict_json import strict
 from laufruhe.report.table_files import MAX_PAGE_ROWS, write_book, write_csv
-from laufruhe.report.web_page import as_html
+from laufruhe.report.web_page import write_pages
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.text import Text
@@ -71,8 +71,7 @@ def write_study(
         write_book(tables, folder / files.BOOK)
     document = study_document(study, datasets, seconds, command)
     pictures = {name: picture() for name, picture in pending.items()}
-    files.write(folder / files.REPORT, document.as_markdown(ending))
-    files.write(folder / files.PAGE, as_html(document, pictures))
+    write_pages(folder, document, pictures, ending)
 
 
 def _plain(value: Any) -> Any:

@@ -6,13 +6,15 @@ import base64
 import re
 from collections.abc import Mapping
 from functools import cache
-from importlib.resources import files
+from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup, escape
 
 from laufruhe.live import LiveModel, page_assets
 from laufruhe.present.tables import Table
+from laufruhe.report import files
 from laufruhe.report.document import Document
 
 if TYPE_CHECKING:
@@ -36,6 +38,14 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
     return f"{template(PAGE).render(document=document, pictures=inline, live=sliders)}\n"
 
 
+def write_pages(
+    folder: Path, document: Document, pictures: Mapping[str, str], ending: str, live: LiveModel | None = None
+) -> None:
+    """Write a report as Markdown, whose picture files have the ending `ending`, and as a page."""
+    files.write(folder / files.REPORT, document.as_markdown(ending))
+    files.write(folder / files.PAGE, as_html(document, pictures, live))
+
+
 def table_html(table: Table) -> str:
     """Return heads and rows of a table as HTML."""
     module: Any = template("table.html").module
@@ -47,7 +57,7 @@ def template(name: str = PAGE) -> Template:
     """Return a compiled Jinja template of the HTML report."""
     import jinja2
 
-    loader = jinja2.FunctionLoader(lambda file: (files("laufruhe.report") / file).read_text(encoding="utf-8"))
+    loader = jinja2.FunctionLoader(lambda file: (resources.files("laufruhe.report") / file).read_text(encoding="utf-8"))
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, loader=loader)
     environment.filters["marked"] = _marked
     return environment.get_template(name)

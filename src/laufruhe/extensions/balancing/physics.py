@@ -150,14 +150,6 @@ class Plane:
         clash: Mask = 0.5 * sums + self.wall > chord * (1.0 + 1e-12)
         return clash
 
-    def is_allowed(self, design: Design) -> bool:
-        """Return True if no place has two holes, and no two holes clash."""
-        return all(
-            place != other and not self.clashes(place, other)[hole, second]
-            for k, (place, hole) in enumerate(design)
-            for other, second in design[:k]
-        )
-
 
 @dataclass(frozen=True)
 class Dial:

@@ -23,11 +23,11 @@ from laufruhe.present.numbers import DASH, fixed, number, trimmed
 from laufruhe.present.picture import Area, Axis, Line, Mark, Panel, Picture, Words
 from laufruhe.present.tables import Table
 from laufruhe.report import files
-from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
+from laufruhe.report.document import Block, Document, Heading, Illustration, Paragraph, reproduction, sources
 from laufruhe.report.screen import show_document
-from laufruhe.report.strict_json import made_with, strict, versions
+from laufruhe.report.strict_json import strict, versions
 from laufruhe.report.table_files import write_csv
-from laufruhe.report.web_page import as_html
+from laufruhe.report.web_page import write_pages
 from laufruhe.units import readable, shown_in
 
 HOLES, PICTURE = "holes", "planes"
@@ -90,8 +90,7 @@ def balanced(
             document = report(job, answer, typed("laufruhe", "balance", str(path)))
         text = as_json(job, answer)
         files.write(stage / files.RESULT, text)
-        files.write(stage / files.REPORT, document.as_markdown(f".{kinds[0]}"))
-        files.write(stage / files.PAGE, as_html(document, pictures))
+        write_pages(stage, document, pictures, f".{kinds[0]}")
     is_met = answer is None or answer.is_met
     return lambda stream: show_document(document, stream, folder, files.PAGE), lambda: text, is_met
 
@@ -111,10 +110,7 @@ def report(job: Job, answer: Balanced | None, command: str) -> Document:
 
 
 def _blocks(job: Job, answer: Balanced | None, command: str) -> Iterator[Block]:
-    if job.source:
-        yield Paragraph(f"Source: {job.source}.")
-    if job.assumptions:
-        yield Bullets("Assumptions:", job.assumptions)
+    yield from sources(job.source, job.assumptions)
     if answer is not None:
         yield Heading("Correction")
         yield Paragraph(headline(answer))
@@ -125,9 +121,7 @@ def _blocks(job: Job, answer: Balanced | None, command: str) -> Iterator[Block]:
         yield Paragraph(_proof(answer))
     if (sheet := _card(job)) is not None:
         yield sheet
-    yield Heading("Reproduce")
-    yield Code(command)
-    yield Paragraph(made_with())
+    yield from reproduction(command)
 
 
 def headline(answer: Balanced) -> str:

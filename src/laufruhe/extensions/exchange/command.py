@@ -10,7 +10,7 @@ import typer
 from typer.models import CommandInfo
 
 from laufruhe.cli.options import LimitOption, ProblemArgument, QuietOption, VerboseOption, examples
-from laufruhe.cli.screen import FAILED, Watched, complain, exit_statuses, is_quiet, progress, resources, spoken
+from laufruhe.cli.screen import exit_statuses, is_quiet, progress, resources, spoken
 
 Target = StrEnum("Target", ["csv", "json", "netcdf", "uff", "nastran", "exudyn", "opentorsion"])
 ENDINGS = {"netcdf": "loads.nc", "nastran": "loads.bdf", "exudyn": "exudyn.py", "opentorsion": "opentorsion.py"}
@@ -39,7 +39,7 @@ def export(
     What the problem leaves open is decided first. Files that Laufruhe did not make are not replaced.
     """
     with exit_statuses(problem), spoken(quiet, verbose), progress() as say, resources(limit, None):
-        from laufruhe.cli.solve import evaluate, solve
+        from laufruhe.cli.solve import designed
         from laufruhe.errors import printed
         from laufruhe.extensions.exchange.writers import checked_nodes, write
         from laufruhe.files.reader import load
@@ -51,10 +51,7 @@ def export(
         path = out or Path("results") / f"{name}-{ENDINGS.get(to, f'loads.{to}')}"
         with files.staged_file(path, "--out") as stage:
             say("evaluating" if initial else "deciding")
-            result = (evaluate if initial else solve)(loaded, Watched(say, loaded.objective_unit or ""))
-            if not result.status.has_design:
-                complain(f"{printed(str(problem))}: {result.status}: {result.message}")
-                raise typer.Exit(FAILED)
+            result = designed(loaded, problem, initial, say)
             say("writing")
             content = write(result, str(to), nodes, highest, millimetres, stage)
         if not is_quiet():

@@ -21,11 +21,11 @@ from laufruhe.present.numbers import DASH, number
 from laufruhe.present.tables import Table
 from laufruhe.problem.problem import Problem
 from laufruhe.report import files
-from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Paragraph
+from laufruhe.report.document import Block, Bullets, Document, Heading, Paragraph, reproduction, sources
 from laufruhe.report.screen import show_document
-from laufruhe.report.strict_json import made_with, strict, versions
+from laufruhe.report.strict_json import strict, versions
 from laufruhe.report.table_files import write_csv
-from laufruhe.report.web_page import as_html
+from laufruhe.report.web_page import write_pages
 from laufruhe.units import readable, shown_in
 
 NUMBERS, IDENTIFIED = "estimates.csv", "identified.toml"
@@ -57,8 +57,7 @@ def identified(path: Path, out: Path | None, say: Callable[[str], None]) -> tupl
         text = as_json(problem, measurements, answer)
         write_csv(_table(answer, is_readable=False), stage / NUMBERS)
         files.write(stage / files.RESULT, text)
-        files.write(stage / files.REPORT, document.as_markdown(".svg"))
-        files.write(stage / files.PAGE, as_html(document, {}))
+        write_pages(stage, document, {}, ".svg")
         files.write(stage / IDENTIFIED, with_estimates(problem, answer).to_toml())
     return lambda stream: show_document(document, stream, folder, files.PAGE), lambda: text
 
@@ -86,10 +85,7 @@ def with_estimates(problem: Problem, answer: Estimate) -> Problem:
 
 
 def _blocks(problem: Problem, measurements: Sequence[Measurement], answer: Estimate, path: str) -> Iterator[Block]:
-    if problem.source:
-        yield Paragraph(f"Source: {problem.source}.")
-    if problem.assumptions:
-        yield Bullets("Assumptions:", problem.assumptions)
+    yield from sources(problem.source, problem.assumptions)
     yield Heading("Identified numbers")
     yield _table(answer, is_readable=True)
     yield Paragraph(_minimum(answer))
@@ -111,9 +107,7 @@ def _blocks(problem: Problem, measurements: Sequence[Measurement], answer: Estim
     yield _place_table(measurements, answer)
     if answer.misfit is not None:
         yield Paragraph(_misfit(answer.misfit))
-    yield Heading("Reproduce")
-    yield Code(typed("laufruhe", "identify", path))
-    yield Paragraph(made_with())
+    yield from reproduction(typed("laufruhe", "identify", path))
 
 
 def _minimum(answer: Estimate) -> str:

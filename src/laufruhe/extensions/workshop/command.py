@@ -9,7 +9,7 @@ import typer
 from typer.models import CommandInfo
 
 from laufruhe.cli.options import ProblemArgument, QuietOption, VerboseOption, examples
-from laufruhe.cli.screen import FAILED, Watched, complain, exit_statuses, is_quiet, progress, spoken
+from laufruhe.cli.screen import exit_statuses, is_quiet, progress, spoken
 
 OUT = "Folder of the drawings.  [default: results/<name of the file>-drawings]"
 INITIAL = "Draw the file's own numbers; nothing is decided."
@@ -28,7 +28,7 @@ def drawing(
     """
     with exit_statuses(problem), spoken(quiet, verbose), progress() as say:
         from laufruhe.cli.check import warn
-        from laufruhe.cli.solve import evaluate, solve
+        from laufruhe.cli.solve import designed
         from laufruhe.errors import counted, printed
         from laufruhe.extensions.workshop.drawings import problem_with_bodies, write_drawings
         from laufruhe.report import files
@@ -37,10 +37,7 @@ def drawing(
         name = loaded.name.strip(".") or "problem"
         folder = out or Path("results") / f"{name}-drawings"
         say("evaluating" if initial else "deciding sizes")
-        result = (evaluate if initial else solve)(loaded, Watched(say, loaded.objective_unit or ""))
-        if not result.status.has_design:
-            complain(f"{printed(str(problem))}: {result.status}: {result.message}")
-            raise typer.Exit(FAILED)
+        result = designed(loaded, problem, initial, say)
         option = "results" if out is None else "--out"
         with files.staged(files.FileSet(folder, option, "drawing", ())) as stage:
             say("drawing")
