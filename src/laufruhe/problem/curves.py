@@ -175,7 +175,7 @@ def _amplitudes(harmonics: Fields) -> Fields:
         is_vector = _is_vector(field)
         # a resonance has no finite amplitude
         with np.errstate(invalid="ignore"):
-            values = order_amplitude(field.values if is_vector else field.values[..., None])
+            values = order_amplitude(np.asarray(field.values if is_vector else field.values[..., None], complex))
         values = np.where(np.isfinite(values), values, math.inf)
         fields.append(replace(field, own_axes=field.own_axes[:-1] if is_vector else field.own_axes, values=values))
     return replace(harmonics, title="Amplitudes by order", fields=tuple(fields))
