@@ -51,6 +51,7 @@ _OF_CONSTANT_STIFFNESS = frozenset({
     channels.FREQUENCIES, channels.MOTION_FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL,
     channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL,
 })  # fmt: skip
+_OF_OPEN_FREQUENCY = frozenset({channels.RAW_TORQUE_ROLL})
 _ROUNDING = 1e-9
 
 
@@ -181,7 +182,7 @@ class MeasureContext:
         points, cases = ([named.name for named in listed] for listed in (self.points, self.engine.load_cases))
         _check_known(table.operating_points, points, f"{where}.operating_points", "operating point")
         _check_known(table.load_cases, cases, f"{where}.load_cases", "load case")
-        if "frequency" in channel.keys and channel != channels.RAW_TORQUE_ROLL:
+        if "frequency" in channel.keys and channel not in _OF_OPEN_FREQUENCY:
             remedy = "give the desired natural frequency about the axis"
             if table.frequency is None:
                 raise Refused(f"{where}.frequency", None, "is missing", remedy)

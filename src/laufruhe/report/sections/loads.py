@@ -40,6 +40,8 @@ TORQUE = (
     "Irregularity: largest less smallest speed over the mean. To turn: largest torque that turns the crank slowly, "
     "without combustion and friction."
 )
+# channels of the flywheel that depend on the speed of the crank
+_OF_SPEED = frozenset({IRREGULARITY})
 EVEN = (
     "Speeds at which this flywheel keeps the limit with the same torque of gas and load; the ranges are proven (T13)."
 )
@@ -165,7 +167,7 @@ def _even_speeds(result: Result) -> list[Table]:
     rows = []
     for limit in result.problem.limits:
         for point in result.problem.points:
-            if limit.measure.channel == IRREGULARITY and inertia is not None and limit.measure.includes_point(point):
+            if limit.measure.channel in _OF_SPEED and inertia is not None and limit.measure.includes_point(point):
                 ranges = swing_of(engine, point, fidelity).speed_ranges(limit.maximum, inertia)
                 rows.append((limit.name, point.name, "; ".join(starmap(_range_text, ranges)) or DASH))
     head = ("limit", "gas and load of", "speeds [rpm]")
