@@ -7,21 +7,24 @@ The book's chain of rounded intermediate results is followed for the tolerances,
 from __future__ import annotations
 
 import math
+import tomllib
 from itertools import permutations
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from laufruhe.files.reader import load
 from laufruhe.machine import Cycle, Engine, OperatingPoint, PressureTrace, Rod, SliderCrank
 from laufruhe.machine import kinematics as slider_crank
 from laufruhe.machine.gas import AMBIENT_PRESSURE
 from laufruhe.machine.layouts import build, even_throws, inline
 from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.shaking_loads import reciprocating_loads
+from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from mechanisms import mechanism_of
 from one_cylinder import rotating_loads
+from problem_files import PROBLEMS
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 
@@ -40,6 +43,25 @@ def test_piston_travel_at_a_right_angle() -> None:
     assert exact - approximate > 10 * 0.005
     # -0.1 mm stands for anything from -0.095 to -0.105 mm
     assert 100 * (approximate - exact) / exact == pytest.approx(-0.178, abs=100 * 0.005 / 56.35)
+
+
+@pytest.mark.parametrize(
+    ("speed", "exponent"), [('speed = "2500 rpm"', 2 / 3), ('mean_piston_speed = "10 m/s"', -2 / 3)]
+)
+def test_long_and_short_stroke_of_one_swept_volume(speed: str, exponent: float) -> None:
+    """Fig. 2.5: at one volume the stroke is as (s/D)^2/3; inertia is as r n^2, with n constant or as 1/s."""
+    text = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
+    tables = tomllib.loads(text.replace('mean_piston_speed = "10 m/s"', speed))
+    volumes, forces = [], []
+    for ratio in (0.7, 1.4):
+        problem = load({**tables, "quantities": {"stroke_over_bore": ratio}})
+        (part,) = problem.engine.slider_cranks
+        assert part.bore is not None
+        assert part.stroke / part.bore == pytest.approx(ratio)
+        volumes.append(part.piston_area * part.stroke)
+        forces.append(abs(shaking_loads(problem.engine, problem.points[0], EXACT).at(1)[2]))
+    assert volumes[1] == pytest.approx(volumes[0])
+    assert forces[1] / forces[0] == pytest.approx(2.0**exponent)
 
 
 class TestCrankPinLoad:

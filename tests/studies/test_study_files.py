@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at, keys_of
+from laufruhe.studies.equal_power import at_equal_power
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Point, ProblemFiles
@@ -128,12 +130,12 @@ BAD = [
      'k = { values = [1, 2] } }'), "makes 200000 points"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{FRACTION}" = 0.5 }}', "is swept, and set by"),
     (study(sweep=swept("engine.rod_ration", "values = [0.2, 0.3]")), "did you mean 'rod_ratio'?"),
-    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is not the path of a quantity of this problem"),
+    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "block.inertia: is missing"),
+    (study(sweep=swept("blok.mass", 'values = ["1 kg", "2 kg"]')), "is not the path of a quantity of this problem"),
     (study(sweep=swept("engine.rod_ratio", "values = [0.2, 1.2]")), "rod_ratio"),
     (study(problem="tractor-four-lanchester"), "has no open balance factor"),
     (study("balancer sizing"), "no balancer shaft to size"),
     (study("layout comparison", problem="nowhere"), "file: is named by the study, but does not exist; paths begin in"),
-    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "write it into the problem file first"),
     (study(sweep=swept("stroke", 'values = ["100 mm", "110 mm"]')), "write the whole path, engine.stroke"),
     (study(sweep=swept("operating_points.mean_piston_speed", 'from = "6 m/s"\nto = "8 m/s"\npoints = 3')),
      "is not the path of a number in the problem file; write its whole path, such as operating_points.1.speed"),
@@ -256,6 +258,43 @@ def test_equal_power_is_eq_23(tmp_path: Path) -> None:
     assert found[1]["objective_given"].values == pytest.approx(2.0 * found[0]["objective_given"].values, rel=1e-9)
     assert found[1]["objective"].values == pytest.approx(2.0 * found[0]["objective"].values, rel=1e-4)
     assert found[1].attrs["at"] == "the power of 4 cylinders"
+    assert "size" not in found[0]
+    size = {name: found[1]["size"].sel(size_name=name).item() for name in found[1]["size_name"].values}
+    assert size["bore"] == pytest.approx(0.1 * math.sqrt(2.0))
+    assert size["stroke"] == pytest.approx(0.12 * math.sqrt(2.0))
+    # mean pressure and mean piston speed of the file, on the piston area of four cylinders
+    mean_pressure, area = 9.0 * 98066.5, 4 * 0.25 * math.pi * 0.1**2
+    assert size["power"] == pytest.approx(mean_pressure * area * 10.0 / 4.0, rel=1e-3)
+    assert size["displacement"] * size["speed"] / math.tau / 2.0 * mean_pressure == pytest.approx(size["power"])
+    mounts = load(PROBLEMS / "tractor-two.toml").engine.mounts
+    assert found[1]["mount_x"].values[0] == pytest.approx([math.sqrt(2.0) * mount.position[0] for mount in mounts])
+
+
+def test_an_open_stroke_is_decided_at_equal_power() -> None:
+    """A number that rebuilds the engine gives the engine of the file with this number, resized."""
+    text = (PROBLEMS / "single-stroke-offset.toml").read_text(encoding="utf-8")
+    problem, fixed = load(text), load(text.replace('{ between = ["80 mm", "160 mm"], start = "120 mm" }', '"150 mm"'))
+    names = [decision.name for decision in problem.decisions]
+    values = [0.15 if name == "engine.stroke" else start for name, start in zip(names, problem.start, strict=True)]
+    built, wanted = at_equal_power(problem, 4).fixed_at(values), at_equal_power(fixed, 4)
+    (part,), (resized,) = built.engine.slider_cranks, wanted.engine.slider_cranks
+    assert (part.bore, part.stroke) == pytest.approx((0.2, 0.3))
+    assert part.reciprocating_mass == pytest.approx(resized.reciprocating_mass)
+    assert built.points[0].speed == pytest.approx(wanted.points[0].speed)
+
+
+@pytest.mark.parametrize(("name", "setting", "left_out"), [
+    ("vee", {"layout": "vee", "cylinders": 8, "bank_angle": 90, "split_pin_angle": 0}, ()),
+    ("boxer", {"layout": "boxer", "firing_order": [1, 2, 3, 4], "bank_stagger": "40 mm"}, ("phasing", "engine.throws")),
+])  # fmt: skip
+def test_one_problem_file_has_many_layouts(name: str, setting: dict[str, object], left_out: tuple[str, ...]) -> None:
+    files, path = ProblemFiles(PROBLEMS), "compare-inline.toml"
+    keys = {f"engine.{key}": value for key, value in setting.items()}
+    case_of_one = CaseTable(name=name, problem=path, without=list(left_out), set=keys)
+    own, other = files.tables(Point(case_of_one)), files.file(f"compare-{name}.toml")
+    assert {key: own[key] for key in own if key not in ("title", "assumptions")} == {
+        key: other[key] for key in other if key not in ("title", "assumptions")
+    }
 
 
 READ = """readings = { "as printed" = { "engine.reciprocating_mass" = "1.25 kg" }, "2.25 kg" = { "engine.reciprocating_mass" = "2.25 kg" } }"""  # noqa: E501

@@ -25,11 +25,14 @@ def at(node: Any, place: Sequence[Any]) -> Any:
 
 
 def with_value_at(tables: Mapping[str, Any], place: Sequence[Any], value: Any) -> dict[str, Any]:
-    """Return a copy of the tables with another value at an address; unchanged parts are shared."""
+    """Return a copy of the tables with another value at an address; unchanged parts are shared.
+
+    Tables on the way that are missing are added.
+    """
     result = dict(tables)
     table: Any = result
     for key in place[:-1]:
-        table[key] = table[key].copy()
+        table[key] = {} if isinstance(table, dict) and key not in table else table[key].copy()
         table = table[key]
     table[place[-1]] = value
     return result

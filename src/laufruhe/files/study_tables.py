@@ -68,8 +68,10 @@ class CaseTable(Table):
 
     name: Name
     problem: str
-    set: dict[str, Setting] = f.optional("Paths of the problem file and their new values, or lists of these.", {})
-    without: list[str] = f.optional("Tables that are left out, such as balancer_shafts or gas.", [])
+    set: dict[str, Setting] = f.optional(
+        "Paths and their values, or lists of these. A key that the problem file lacks is added.", {}
+    )
+    without: list[str] = f.optional("Paths that are left out, such as balancer_shafts or engine.throws.", [])
     equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = f.optional(
         "The engine is rebuilt with the power of this many of its cylinders."
     )
@@ -81,8 +83,33 @@ def at(tables: dict[str, Any], where: str) -> Any:
 
 
 def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
-    """Return a copy of tables with another value at a path; raise `Refused` if there is no such path."""
-    return nested.with_value_at(tables, keys_of(tables, where), value)
+    """Return a copy of tables with another value at a path; raise `Refused` if problem files have no such key."""
+    return nested.with_value_at(tables, address_of(tables, where), value)
+
+
+def address_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
+    """Return the address of a path, also of a key of problem files that this file lacks; raise `Refused` for others."""
+    node: Any = tables
+    keys, parts = list[Any](), parts_of(where)
+    for k, part in enumerate(parts):
+        options = _options(node)
+        if part not in options:
+            address = (*keys, *parts[k:])
+            is_known = isinstance(node, dict) and bool(nested.annotations_at(file_model(), address))
+            return address if is_known else keys_of(tables, where)
+        keys.append(options[part])
+        node = node[options[part]]
+    return tuple(keys)
+
+
+def without(tables: dict[str, Any], where: str) -> dict[str, Any]:
+    """Return a copy of tables without the key or list entry at a path; raise `Refused` if there is none."""
+    *above, last = keys_of(tables, where)
+    table = nested.at(tables, above)
+    rest: Any = [*table[:last], *table[last + 1 :]] if isinstance(table, list) else {**table}
+    if isinstance(rest, dict):
+        del rest[last]
+    return nested.with_value_at(tables, above, rest) if above else rest
 
 
 def joined(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.layouts import Layout
-from laufruhe.problem.decision import Decision, RotorDrive
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.decision import Decision, Kind, RotorDrive
+from laufruhe.problem.problem import Drawing, Problem
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
             "cylinders differ in bore or stroke, so no common scale gives equal power; give all the same size"
         )
     scale, phasing = equal_power_scale(len(cylinders), reference_cylinders), problem.phasing
-    k, m = scale.length, scale.mass
+    k = scale.length
 
     def scaled_layout(layout: Layout) -> Layout:
         places, throws = (tuple(k * x for x in xs) for xs in (layout.positions, layout.throw_positions))
@@ -63,9 +63,23 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
             problem_of=lambda candidate: at_equal_power(problem_of(candidate), reference_cylinders),
             layout=lambda bank, split: scaled_layout(layout(bank, split)),
         )
+    drawing = _scaled(Drawing(problem.engine, problem.points, problem.decisions, problem.mount_numbers), scale)
+    return replace(
+        problem,
+        origin=None,
+        phasing=phasing,
+        engine=drawing.engine,
+        points=drawing.points,
+        decisions=drawing.decisions,
+        rebuild=lambda changes: _scaled(problem.rebuild(changes), scale),
+    )
+
+
+def _scaled(drawing: Drawing, scale: EqualPowerScale) -> Drawing:
+    k, m, engine = scale.length, scale.mass, drawing.engine
     engine = replace(
-        problem.engine,
-        slider_cranks=tuple(part.scaled(k, m) for part in cylinders),
+        engine,
+        slider_cranks=tuple(part.scaled(k, m) for part in engine.slider_cranks),
         rotors=tuple(
             replace(
                 rotor,
@@ -73,31 +87,37 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
                 radius=None if rotor.radius is None else rotor.radius * k,
                 reach=None if rotor.reach is None else rotor.reach * k,
             ).placed(*(k * along for along in rotor.place))
-            for rotor in problem.engine.rotors
+            for rotor in engine.rotors
         ),
-        bearings=tuple(bearing.scaled(k) for bearing in problem.engine.bearings),
-        extras=tuple(extra.scaled(k, m) for extra in problem.engine.extras),
-        load_torque=problem.engine.load_torque and problem.engine.load_torque.scaled(1.0 / scale.speed),
+        bearings=tuple(bearing.scaled(k) for bearing in engine.bearings),
+        extras=tuple(extra.scaled(k, m) for extra in engine.extras),
+        load_torque=engine.load_torque and engine.load_torque.scaled(1.0 / scale.speed),
         mounts=tuple(
             mount.mapped(
                 lambda part: replace(part, position=(k * part.position[0], k * part.position[1], k * part.position[2]))
             )
-            for mount in problem.engine.mounts
+            for mount in engine.mounts
         ),
     )
     return replace(
-        problem,
-        origin=None,
-        phasing=phasing,
+        drawing,
         engine=engine,
-        points=tuple(replace(point, speed=point.speed * scale.speed) for point in problem.points),
-        decisions=tuple(_decision(decision, k, m) for decision in problem.decisions),
+        points=tuple(replace(point, speed=point.speed * scale.speed) for point in drawing.points),
+        decisions=tuple(_decision(decision, k, m) for decision in drawing.decisions),
     )
 
 
 def _decision(decision: Decision, length: float, mass: float) -> Decision:
-    """Return a decision of an engine scaled to equal power: bounds, start and gains times length and mass factors."""
-    size = {"": 1.0, "m": length, "kg": mass, "kg m": mass * length}[decision.unit]
+    """Return a decision of an engine scaled to equal power: bounds, start and gains times length and mass factors.
+
+    Other numbers of the file, such as an open stroke, keep their values: the engine is built with them and then scaled.
+    """
+    if decision.address_drives or decision.kind is Kind.FLYWHEEL:
+        return decision
+    sizes = {"": 1.0, "rad": 1.0, "m": length, "kg": mass, "kg m": mass * length}
+    if decision.unit not in sizes:
+        raise ModelError(f"equal_power_to has no rule for {decision.name}, which is open; fix it")
+    size = sizes[decision.unit]
     return replace(
         decision,
         set=decision.set.scaled(size),

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import Complaint, InputError, ModelError, refused
-from laufruhe.files.complaints import errors_in_file, nearest, nearest_file
+from laufruhe.files.complaints import Refused, errors_in_file, nearest, nearest_file
 from laufruhe.files.nested import texts_in
 from laufruhe.files.phasing import without_shafts
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.files.study_tables import CaseTable, changed
+from laufruhe.files.study_tables import CaseTable, changed, without
 from laufruhe.machine import Role
 from laufruhe.numerics.libraries import library_versions
 from laufruhe.problem.problem import Problem
@@ -62,11 +62,12 @@ class ProblemFiles:
         """
         case = point.case
         tables = dict(self.file(case.problem) if point.base is None else point.base)
-        for name in case.without:
-            if name not in tables:
+        for where in case.without:
+            try:
+                tables = without(tables, where)
+            except Refused:
                 rule = "is listed under without, but the problem does not have it"
-                raise self.refused(case, name, rule, nearest(name, list(tables)))
-            del tables[name]
+                raise self.refused(case, where, rule, nearest(where, list(tables))) from None
         with self.named(case):
             for where, value in {**case.set, **point.changes}.items():
                 tables = changed(tables, where, value)

@@ -147,13 +147,14 @@ def groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, p.Col
     distinct = list(dict.fromkeys(keys))
     line_groups = []
     for k, key in enumerate(distinct):
-        words = ", ".join(_with_unit(data[name], value) for name, value in zip(keyed_by, key, strict=True))
+        words = ", ".join(in_words(data[name], value) for name, value in zip(keyed_by, key, strict=True))
         chosen = np.array([row_key == key for row_key in keys])
         line_groups.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(distinct))))
     return line_groups
 
 
-def _with_unit(values: xr.DataArray, value: Any) -> str:
+def in_words(values: xr.DataArray, value: Any) -> str:
+    """Return a swept value with its unit, or with its name if it is a plain number."""
     unit = values.attrs.get("units", "")
     if not isinstance(value, float):
         return str(value)

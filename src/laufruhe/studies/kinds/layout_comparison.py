@@ -14,7 +14,7 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.physics.torque import swing_of
+from laufruhe.physics.torque import swing_of, torque_facts
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import number as figures
 from laufruhe.problem.evaluation import Evaluation
@@ -23,7 +23,17 @@ from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import Further, SweptPart, solve_scene
-from laufruhe.studies.swept_report import MAX_ROWS, NOTHING_OPEN, bars, by_point, claim_of, over_sweep, swept_names
+from laufruhe.studies.swept_report import (
+    MAX_ROWS,
+    NOTHING_OPEN,
+    bars,
+    by_point,
+    claim_of,
+    in_words,
+    over_sweep,
+    readable_metric,
+    swept_names,
+)
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 
@@ -33,6 +43,13 @@ if TYPE_CHECKING:
 EQUAL = "equal cylinders"
 _SAME, _NEGLIGIBLE, _FIGURES = 1e-9, 1e-7, 1e-5
 _MIN_FLYWHEEL = "least flywheel"
+_RESIZED = (
+    "Resized engines. With z cylinders, all lengths of a problem file are multiplied by the root of the number of "
+    "reference cylinders over z: bore, stroke, spacing, planes of weights, and positions of mounts. Masses grow with "
+    "the cube of this factor, and speeds fall with it (Hasselgruber 1964, eqs. 18 to 22). So mounts follow the size of "
+    "a cylinder; with the number of cylinders they move only if the problem file of a case has other positions. "
+    "Flywheel and limits stay as in the file. Power is the mean power of the crankshaft."
+)
 # height of a row, and of the margins above and below [inch]
 ROW, AROUND = 0.19, 0.9
 # panels side by side, and spread of values from which an axis is logarithmic
@@ -100,7 +117,14 @@ class LayoutComparison(SweptPart):
             further[_MIN_FLYWHEEL] = lambda design: max(
                 swing_of(design.engine, loads.point, design.fidelity).minimum_inertia(degree) for loads in design.loads
             )
-        return solve_scene(problem, further)
+        sizes = {} if point.case.equal_power_to is None else _sizes(problem)
+        record = solve_scene(problem, {**further, **{name: size for name, (_, size) in sizes.items()}})
+        for name in sizes:
+            del record["why_none"][name]
+        record["size"] = {name: record["further"].pop(name) for name in sizes}
+        record["size_units"] = {name: unit for name, (unit, _) in sizes.items()}
+        record["places"] = {mount.name: list(mount.position) for mount in problem.engine.mounts}
+        return record
 
     def _check_cylinders(self, problem_files: ProblemFiles) -> None:
         """Raise `InputError` for layouts with different cylinders, because size would then change the comparison."""
@@ -125,6 +149,8 @@ class LayoutComparison(SweptPart):
         power = self.cases[0].equal_power_to
         size = EQUAL if power is None else f"the power of {power} cylinders"
         data = super().dataset(points, records).assign_attrs(at=size)
+        if power is not None:
+            data = _with_sizes(data, records)
         names = list(dict.fromkeys(name for record in records for name in record["further"]))
         if not names:
             return data
@@ -144,7 +170,7 @@ class LayoutComparison(SweptPart):
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
         """Return a row per point; then the ranking by the metric, with the place by every further quantity."""
-        tables = by_point(data)
+        tables = [*_best(data), *by_point(data), *(_size_table(data) if "size" in data.data_vars else [])]
         return [*tables, *_ranking(data)] if "further" in data else tables
 
     @staticmethod
@@ -157,6 +183,77 @@ class LayoutComparison(SweptPart):
             return over_sweep(data, [], words if is_equal else f"At {size}. {words}")
         words = f"Engines of {size}." if is_equal else f"At {size}."
         return _side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)
+
+
+def _sizes(problem: Problem) -> dict[str, tuple[str, Further]]:
+    """Return the sizes of a resized engine by name: unit, and function of its design."""
+
+    def power(k: int) -> Further:
+        return lambda design: torque_facts(design.engine, design.loads[k].point, design.fidelity).power
+
+    def speed(k: int) -> Further:
+        return lambda design: design.loads[k].point.speed
+
+    sizes: dict[str, tuple[str, Further]] = {
+        "bore": ("m", lambda design: math.sqrt(4.0 * design.engine.slider_cranks[0].piston_area / math.pi)),
+        "stroke": ("m", lambda design: design.engine.slider_cranks[0].stroke),
+        "displacement": ("m^3", lambda design: sum(p.piston_area * p.stroke for p in design.engine.slider_cranks)),
+    }
+    for k, point in enumerate(problem.points):
+        at = f" at {point.name}" if len(problem.points) > 1 else ""
+        sizes |= {f"speed{at}": ("rad/s", speed(k)), f"power{at}": ("W", power(k))}
+    return sizes
+
+
+def _with_sizes(data: xr.Dataset, records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+    units = {name: unit for record in records for name, unit in record["size_units"].items()}
+    values = [[record["size"].get(name, math.nan) for name in units] for record in records]
+    about = {"long_name": "size of the resized engine, in size_unit", "unit_of": "size_unit"}
+    places = np.full((len(records), data.sizes["mount"], 3), math.nan)
+    for row, record in zip(places, records, strict=True):
+        for k, name in enumerate(data["mount"].values.tolist()):
+            row[k] = record["places"].get(name, math.nan)
+    data = data.assign(size=(("point", "size_name"), np.array(values), about))
+    for k, axis in enumerate("xyz"):
+        along = {"units": "m", "long_name": f"{axis} of the mount"}
+        data = data.assign({f"mount_{axis}": (("point", "mount"), places[..., k], along)})
+    return data.assign_coords(size_name=list(units), size_unit=("size_name", list(units.values())))
+
+
+def _best(data: xr.Dataset) -> list[Text]:
+    """Return a sentence that names the best of several points; several are named if their values agree."""
+    data = readable_metric(data)
+    values, unit = data["objective"].values, data["objective"].attrs["units"]
+    best = [k for k, place in enumerate(_places(values)) if place == 1]
+    if not best or np.isfinite(values).sum() < 2:
+        return []
+    names = [
+        ", ".join(
+            [str(data["case"].values[k]), *(in_words(data[n], data[n].values[k].item()) for n in swept_names(data))]
+        )
+        for k in best
+    ]
+    return [f"Best: {' and '.join(names)}, with {number(float(values[best[0]]))} {unit}".rstrip() + "."]
+
+
+def _size_table(data: xr.Dataset) -> list[Text]:
+    """Return the sizes of the resized engines, a row for each point, and the rule of resizing."""
+    usual = {"m^3": "l", "W": "kW"}
+    units = [readable(unit, usual.get(unit, "")) for unit in map(str, data["size_unit"].values)]
+    (length, millimetres), swept, rows = readable("m"), swept_names(data), []
+    mounts = data["mount"].values.tolist()
+    for k in range(min(data.sizes["point"], MAX_ROWS)):
+        sizes = zip(data["size"].values[k], units, strict=True)
+        places = (millimetres * np.array([data[f"mount_{axis}"].values[k] for axis in "xyz"])).T
+        rows.append([
+            str(data["case"].values[k]), *(in_words(data[name], data[name].values[k].item()) for name in swept),
+            *(number(factor * value) for value, (_, factor) in sizes),
+            *(", ".join(figures(value, 4, 1.0) for value in place) if np.isfinite(place).all() else DASH
+              for place in places.tolist()),
+        ])  # fmt: skip
+    names = [f"{name} [{unit}]" for name, (unit, _) in zip(data["size_name"].values.tolist(), units, strict=True)]
+    head = ["case", *swept, *names, *(f"{name}, x, y, z [{length}]" for name in mounts)]
+    return [_RESIZED, marked_table(head, rows, data.sizes["point"] - len(rows))]
 
 
 def _value(measure: Measure | InputError, design: Evaluation) -> float:
