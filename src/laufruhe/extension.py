@@ -103,8 +103,10 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "balance": "balancing",
         "compare": "comparison",
         "drawing": "workshop",
+        "explain": "fidelity",
         "export": "exchange",
         "identify": "identification",
+        "trade": "fidelity",
     },
     "keys": {
         "torsion": "torsion",

@@ -11,7 +11,7 @@ import sys
 from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, TextIO
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
@@ -33,7 +33,6 @@ from laufruhe.cli.screen import (
     open_closed_streams,
     progress,
     resources,
-    share_below_one,
     spoken,
     warn_plainly,
 )
@@ -256,50 +255,6 @@ def check(
             from laufruhe.cli.check import check_problem
 
             hand_out(*check_problem(problem))
-
-
-@app.command(epilog=o.examples("laufruhe explain problem.toml --tolerance 1e-2"))
-def explain(
-    problem: o.ProblemArgument,
-    json: o.JsonOption = None,
-    tolerance: o.FidelityTolerance = 1e-3,
-    quiet: o.QuietOption = False,
-    verbose: o.VerboseOption = False,
-) -> None:
-    """Say which parts of the physics this problem needs, and why."""
-    with exit_statuses(problem), spoken(quiet, verbose), handing_out(json, problem) as hand_out:
-        from laufruhe.cli.fidelity import explained
-
-        hand_out(*explained(problem, share_below_one("--tolerance", tolerance)))
-
-
-@app.command(epilog=o.examples("laufruhe trade problem.toml"))
-def trade(
-    problems: o.Problems,
-    json: o.JsonOption = None,
-    out: o.PagesOption = None,
-    time_limit: o.StopOption = None,
-    quiet: o.QuietOption = False,
-    verbose: o.VerboseOption = False,
-) -> None:
-    """Measure time and error of every simplification.
-
-    Each fidelity, that is each choice of how exactly the physics is computed, is tried on these problems.
-    """
-    with exit_statuses(problems[0]), spoken(quiet, verbose), resources(time_limit, None):
-        from laufruhe.cli.fidelity import traded
-        from laufruhe.report.screen import show_document
-
-        folder = out or Path("results") / "trade"
-        with handing_out(json, *problems) as hand_out:
-            with progress() as say:
-                documents, data = traded(problems, folder, say)
-
-            def show(stream: TextIO) -> None:
-                for document, page in documents:
-                    show_document(document, stream, folder, page)
-
-            hand_out(show, data)
 
 
 def _show_version(is_requested: bool) -> None:

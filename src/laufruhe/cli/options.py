@@ -37,8 +37,6 @@ StudyJsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", h
 OUT = "Folder of the results.  [default: results/<name of the file>{}]"
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT.format(""))]
 InitialOutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT.format("-initial"))]
-PAGES = "Folder of the pages.  [default: results/trade]"
-PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
 
 
 class Format(StrEnum):
@@ -62,8 +60,6 @@ SERIES = "Add the loads over the cycle to the JSON."
 SeriesOption = Annotated[bool, typer.Option("--series", help=SERIES)]
 GAP = "Relative gap at which an optimum counts as proven, in place of the file's."
 ToleranceOption = Annotated[float | None, typer.Option("--tolerance", metavar="X", help=GAP)]
-ERROR = "Relative error of the objective that is allowed."
-FidelityTolerance = Annotated[float, typer.Option("--tolerance", metavar="X", help=ERROR)]
 LIMIT = "End the search after SECONDS with the best design so far and its bound."
 LimitOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=LIMIT)]
 SOLVER = "Let a solver of cvxpy propose unbalances, such as SCS; the proof stays that of Laufruhe."
@@ -96,6 +92,3 @@ QUIET = "Print errors only."
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)]
 VERBOSE = "Print every step on standard error, in a pipe too."
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help=VERBOSE)]
-Problems = Annotated[
-    list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False, readable=False)
-]

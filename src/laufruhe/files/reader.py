@@ -182,7 +182,7 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     reasons = {
         "an open crank": file.phasing is not None or is_open(file.engine, file.balancer_shafts),
         "[[geared_inertias]]": bool(file.geared_inertias),
-        "fidelity.crank_inertia": file.fidelity.value_of("crank_inertia") is not None,
+        "fidelity.crank_inertia": file.fidelity.crank_inertia is not None,
     }
     if file.engine.gravity and any(reasons.values()):
         what = next(what for what, is_present in reasons.items() if is_present)
@@ -322,7 +322,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     balancer_shafts(file.balancer_shafts, collected)
     is_mirrored = table.value_of("rotation") == REVERSED
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent, is_mirrored), cycle_of(table)
-    wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia"))
+    wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.crank_inertia)
     brake = _brake(file, cylinders, cycle, path.parent)
     gas_table = with_load(file.gas, file.operating_points)
     gas = gas_of(gas_table, path.parent, cycle, cylinders)

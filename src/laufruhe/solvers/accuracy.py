@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from laufruhe.fidelity.error_bounds import (
+from laufruhe.numerics.budget import is_time_over
+from laufruhe.physics.fidelity import EXACT
+from laufruhe.problem.error_bounds import (
     gas_step_bound,
     measure_sampling_error,
     relative,
     sampling_error,
     trace_error,
 )
-from laufruhe.numerics.budget import is_time_over
-from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.evaluation import Evaluation, objective_value, value_of_loads
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem

@@ -11,12 +11,12 @@ from functools import partial
 from typing import TypeVar
 
 from laufruhe.errors import BoundError, ModelError
-from laufruhe.fidelity.error_bounds import measure_sampling_error, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.progress import report_design
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Decision, Kind
 from laufruhe.problem.dependence import depends, open_kinds
+from laufruhe.problem.error_bounds import measure_sampling_error, relative
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import LaufruheWarning, ModelError, wrong_call
-from laufruhe.fidelity.error_bounds import regret_bound
 from laufruhe.problem.curves import STEPS, forces_of, harmonics_of, modes_of, orders_of
+from laufruhe.problem.error_bounds import regret_bound
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem

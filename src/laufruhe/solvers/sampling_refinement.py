@@ -10,9 +10,9 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from laufruhe.fidelity.error_bounds import measure_sampling_error
 from laufruhe.numerics.budget import timed_rounds
 from laufruhe.numerics.witness import check_bound
+from laufruhe.problem.error_bounds import measure_sampling_error
 from laufruhe.problem.evaluation import (
     FINE_SAMPLES,
     Evaluation,

@@ -16,10 +16,10 @@ from functools import partial
 import numpy as np
 
 from laufruhe.errors import BoundError, LaufruheError
-from laufruhe.fidelity.error_bounds import measure_sampling_error, relative
 from laufruhe.machine.firing import firing_turns, from_one, intervals_of, lap_orders
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Domain, decision_vector, domains_of, projected_vector
+from laufruhe.problem.error_bounds import measure_sampling_error, relative
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import SOONEST, Candidate

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
-from laufruhe.machine import Cycle, Engine, PressureTrace
+from laufruhe.machine import Cycle, PressureTrace
 from laufruhe.machine.chambers import CommonGas, CylinderGases, models_of
 from laufruhe.numerics.kinks import SAME_ANGLE
-from laufruhe.numerics.spectrum import Spectrum, as_order
-from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.shaking_loads import rotor_loads
-from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.dependence import keeps_omitted, open_kinds
 from laufruhe.problem.evaluation import (
     Evaluation,
@@ -39,14 +35,6 @@ STRAIGHT, FEWEST = 8, 16
 every second one may be dropped."""
 ROUNDING = 2e-12
 """Relative rounding error of sums of a few thousand terms (F9)."""
-
-
-def reference(problem: Problem, engine: Engine | None = None, samples: int = REFERENCE_SAMPLES) -> Evaluation:
-    """Return the evaluation of a design at the highest fidelity: all orders and modes, rigid rods, many gas samples.
-
-    The crank speed is uneven if it is in the problem. By default the design is that of the problem as given.
-    """
-    return evaluate(problem.at(problem.fidelity.exact(samples)), engine)
 
 
 def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
@@ -79,134 +67,29 @@ def measure_sampling_error(measure: Measure, evaluation: Evaluation) -> float:
     return measure.norm.sampling_bound(spectra, shares, steps, finest)
 
 
-class ErrorReference:
-    """Reference for the errors of cheaper models: the evaluation of one design by the best model.
+def load_sampling_error(problem: Problem, evaluation: Evaluation) -> float:
+    """Return the sampling error of the loads in the objective [SI] (F7, F8)."""
+    terms = (term for term in problem.objective if term.measure.is_load)
+    return sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in terms)
 
-    Attributes
-    ----------
-    best
-        Evaluation by the best model.
-    terms
-        Terms of the objective that are norms of loads, which a fidelity can change.
-    value
-        Objective of loads and masses by the best model [SI].
+
+def gas_step_error(problem: Problem, evaluation: Evaluation) -> float:
+    """Return the error of the objective from the steps of the gas torque, for the design of an evaluation [SI] (F9).
+
+    With kinks in closed form the error falls at least in proportion to the step. The largest change to a half and
+    to a third of the steps is therefore at least the remaining error.
     """
+    steps = evaluation.fidelity.gas_steps
+    still = replace(without_time(evaluation.fidelity), samples=evaluation.samples, gas_samples=steps)
+    if all(still.gas_of(loads.point) is None for loads in evaluation.loads):
+        return 0.0
+    fidelities = (replace(still, gas_samples=steps // times) for times in (1, 2, 3))
+    value, *coarser = (value_of_loads(problem, _at(problem, evaluation, fidelity)) for fidelity in fidelities)
+    return max(abs(other - value) for other in coarser)
 
-    def __init__(self, problem: Problem, best: Evaluation) -> None:
-        self.problem, self.best = problem, best
-        self.terms = [term for term in problem.objective if term.measure.is_load]
-        self.value = value_of_loads(problem, best)
-        self._values: dict[Fidelity, float] = {}
 
-    @classmethod
-    def of(cls, problem: Problem, engine: Engine | None = None) -> ErrorReference:
-        """Return the reference of a design; by default that of the problem as given."""
-        return cls(problem, reference(problem, engine))
-
-    def evaluation(self, fidelity: Fidelity) -> Evaluation:
-        """Return the evaluation of the same design at another fidelity."""
-        return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
-
-    def value_at(self, fidelity: Fidelity) -> float:
-        """Return the objective of loads and masses of the same design at another fidelity [SI]."""
-        key = replace(fidelity, tolerance=None)
-        if key not in self._values:
-            self._values[key] = value_of_loads(self.problem, self.evaluation(key))
-        return self._values[key]
-
-    def relative_change(self, fidelity: Fidelity, other: Fidelity | None = None) -> float:
-        """Return the relative change of the objective between a fidelity and another one, by default the reference."""
-        value = self.value if other is None else self.value_at(other)
-        return relative(abs(self.value_at(fidelity) - value), self.value)
-
-    def sampling_error(self, evaluation: Evaluation) -> float:
-        """Return the sampling error of the objective of an evaluation (F7, F8)."""
-        return sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in self.terms)
-
-    @cached_property
-    def gas_step_error(self) -> float:
-        """Error of the objective of the reference from the steps of the gas torque (F9).
-
-        With kinks in closed form the error falls at least in proportion to the step. The largest change to a half and
-        to a third of the steps is therefore at least the remaining error.
-        """
-        gas_steps = self.best.fidelity.gas_steps
-        still = replace(without_time(self.best.fidelity), samples=self.best.samples, gas_samples=gas_steps)
-        if all(still.gas_of(loads.point) is None for loads in self.best.loads):
-            return 0.0
-        coarser = (replace(still, gas_samples=gas_steps // times) for times in (2, 3))
-        return max(abs(self.value_at(fidelity) - self.value_at(still)) for fidelity in coarser)
-
-    @cached_property
-    def doubt(self) -> float:
-        """Error of the reference itself, in the unit of the objective (F7-F9)."""
-        return self.sampling_error(self.best) + self.gas_step_error + ROUNDING * self.value
-
-    def error_of(self, evaluation: Evaluation) -> float:
-        """Return the error of the objective of an evaluation of the same design: change and doubt (F6).
-
-        The error is relative to the objective of this evaluation, and infinite if only that objective is zero.
-        """
-        value = value_of_loads(self.problem, evaluation)
-        return relative(abs(value - self.value) + self.doubt, value)
-
-    @cached_property
-    def repeats(self) -> int:
-        """Number of periods of all measured signals within the working cycle, for any values of the decisions."""
-        rotors = [r for r in self.problem.engine.rotors if r.unbalance != 0 or r.name in self.open_rotors]
-        ratios = tuple(as_order(abs(rotor.shaft.ratio)) for rotor in rotors)
-        bases = [signal.repeat_order(ratios) for signal in self.exciting_signals]
-        return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
-
-    @property
-    def exciting_signals(self) -> list[Spectrum]:
-        """Spectra of the loads on the block, of unit open unbalances, and of measured loads inside the crankcase."""
-        inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
-        return [*(loads.wrench for loads in self.best.loads), *self.open_rotor_wrenches, *inside]
-
-    @property
-    def open_rotors(self) -> set[str]:
-        """Names of the rotors with open unbalance or position."""
-        sized = {drive.rotor for decision in self.problem.decisions for drive in decision.rotor_drives}
-        return sized | {drive.rotor for decision in self.problem.decisions for drive in decision.place_drives}
-
-    @cached_property
-    def mounting(self) -> ElasticMounting | None:
-        """Block on elastic mounts; None for rigid mounts."""
-        return None if self.best.engine.block is None else mounting_in(self.best.engine)
-
-    @cached_property
-    def open_rotor_wrenches(self) -> list[Spectrum]:
-        """Wrenches of unit unbalances of open rotors at their places, and with each open coordinate 1 m larger."""
-        rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
-        by_name = {rotor.name: rotor for rotor in rotors}
-        for drive in (drive for decision in self.problem.decisions for drive in decision.place_drives):
-            rotor = by_name[drive.rotor]
-            rotors.append(rotor.placed(*(coordinate + (k == drive.axis) for k, coordinate in enumerate(rotor.place))))
-        return [rotor_loads([rotor], 1.0, self.problem.engine.cycle) for rotor in rotors]
-
-    @cached_property
-    def open_rotor_modes(self) -> set[int]:
-        """Numbers of the natural modes that open rotors can excite, 1 the lowest."""
-        if self.mounting is None:
-            return set()
-        return {mode + 1 for load in self.open_rotor_wrenches for mode in self.mounting.excited(load)}
-
-    @cached_property
-    def excited_modes(self) -> tuple[int, ...]:
-        """Numbers of the natural modes that the loads or open rotors excite, 1 the lowest (E12)."""
-        if self.mounting is None:
-            return ()
-        modes = {mode + 1 for loads in self.best.loads for mode in self.mounting.excited(loads.wrench)}
-        return tuple(sorted(modes | self.open_rotor_modes))
-
-    @cached_property
-    def mode_contributions(self) -> dict[int, float]:
-        """Relative change of the objective without each excited mode."""
-        other_modes = {mode: tuple(m for m in self.excited_modes if m != mode) for mode in self.excited_modes}
-        return {
-            mode: self.relative_change(replace(self.best.fidelity, modes=modes)) for mode, modes in other_modes.items()
-        }
+def _at(problem: Problem, evaluation: Evaluation, fidelity: Fidelity) -> Evaluation:
+    return evaluate(replace(problem, fidelity=fidelity), evaluation.engine)
 
 
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
@@ -214,10 +97,10 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
 
     The physics is that of the fidelity of `evaluation`. The error is infinite if only the objective is zero.
     """
-    scale = ErrorReference(problem, evaluation)
-    steps = gas_step_bound(problem, evaluation) if evaluation.fidelity.has_uneven_speed else scale.gas_step_error
-    error = scale.sampling_error(evaluation) + steps + trace_error(problem, evaluation)
-    return relative(error + ROUNDING * scale.value, scale.value)
+    value = value_of_loads(problem, evaluation)
+    step_error = gas_step_bound if evaluation.fidelity.has_uneven_speed else gas_step_error
+    error = load_sampling_error(problem, evaluation) + step_error(problem, evaluation)
+    return relative(error + trace_error(problem, evaluation) + ROUNDING * value, value)
 
 
 def _norm_of_change(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
@@ -272,10 +155,9 @@ def gas_step_bound(problem: Problem, evaluation: Evaluation) -> float:
     fidelity = without_time(evaluation.fidelity)
     if not (fidelity.has_uneven_speed or any(fidelity.gas_of(loads.point) for loads in evaluation.loads)):
         return 0.0
-    scale = ErrorReference(problem, evaluation)
-    initial = evaluation if fidelity is evaluation.fidelity else scale.evaluation(fidelity)
+    initial = evaluation if fidelity is evaluation.fidelity else _at(problem, evaluation, fidelity)
     finer = replace(fidelity, samples=2 * fidelity.samples, gas_samples=2 * fidelity.gas_steps)
-    return 2.0 * largest_change(problem, initial, scale.evaluation(finer))
+    return 2.0 * largest_change(problem, initial, _at(problem, evaluation, finer))
 
 
 def trace_error(problem: Problem, evaluation: Evaluation) -> float:
@@ -291,7 +173,7 @@ def trace_error(problem: Problem, evaluation: Evaluation) -> float:
         changed_gases = [g.mapped(change) if isinstance(g, CylinderGases) else g and change(g) for g in gases]
         points = tuple(replace(p, gas=gas) for p, gas in zip(problem.points, changed_gases, strict=True))
         changed = evaluate(replace(problem, points=points, fidelity=fidelity), evaluation.engine)
-        terms = ErrorReference(problem, evaluation).terms
+        terms = (term for term in problem.objective if term.measure.is_load)
         changes.append(sum(term.weight * _norm_of_difference(term.measure, initial, changed) for term in terms))
     return min(changes)
 

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
+from laufruhe.extensions.fidelity.trade import DESIGNS, Trade
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import BLUE, heading, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
-from laufruhe.studies.trade import DESIGNS, Trade
 
 MIN_ERROR = 1e-7
 PANEL = (5.4, 4.4)

@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 
 from laufruhe.errors import ModelError, plural
-from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, relative, signals
-from laufruhe.fidelity.options import has_gas
+from laufruhe.extensions.fidelity.reference import Reference, reference
 from laufruhe.machine import Engine
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.rigid_body import WRENCH
+from laufruhe.problem.error_bounds import REFERENCE_SAMPLES, relative, signals
 from laufruhe.problem.problem import Problem
 
-DEFAULT_TOLERANCE = 1e-3
 ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256, 384)
 SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30, 40, 60, 80, 120))
 GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
@@ -64,8 +63,9 @@ ROD = SwitchedPart(
     lambda problem: any(effects_of(part, EXACT)[1] for part in problem.engine.slider_cranks),
 )  # fmt: skip
 GAS = SwitchedPart(
-    "gas", "gas", {"gas": False, "gas_orders": None}, {"gas": True, "gas_samples": REFERENCE_SAMPLES}, has_gas
-)
+    "gas", "gas", {"gas": False, "gas_orders": None}, {"gas": True, "gas_samples": REFERENCE_SAMPLES},
+    lambda problem: any(point.gas is not None for point in problem.points),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,13 +92,13 @@ class Choice:
     numbers: tuple[int, int]
 
 
-def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engine | None = None) -> Choice:
+def choose(problem: Problem, tolerance: float, engine: Engine | None = None) -> Choice:
     """Return the cheapest fidelity whose relative error of a design's objective is within the tolerance (F10).
 
     By default the design is that of the problem. If the objective is zero, all parts of the physics that are not zero
     are computed. An uneven crank speed stays uneven.
     """
-    scale = ErrorReference.of(problem, engine)
+    scale = Reference(problem, reference(problem, engine))
     doubt = relative(scale.doubt, scale.value)
     fidelity = _cheapest(scale, max(tolerance - doubt, 0.0), replace(scale.best.fidelity, tolerance=tolerance))
     estimate = scale.relative_change(fidelity) + doubt
@@ -120,7 +120,7 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
     )
 
 
-def _cheapest(reference: ErrorReference, allowed_error: float, fidelity: Fidelity) -> Fidelity:
+def _cheapest(reference: Reference, allowed_error: float, fidelity: Fidelity) -> Fidelity:
     """Return the cheapest fidelity whose relative error from all options together is at most `allowed_error` (F10)."""
     problem, loss = reference.problem, reference.relative_change
     # at an uneven speed, gas and inertia affect all loads
@@ -161,7 +161,7 @@ def _first(
     return candidate
 
 
-def _with_few_modes(reference: ErrorReference, fidelity: Fidelity, allowed_loss: float) -> Fidelity:
+def _with_few_modes(reference: Reference, fidelity: Fidelity, allowed_loss: float) -> Fidelity:
     """Return the fidelity without modes of small response, within a relative change of the objective `allowed_loss`.
 
     Modes that open rotors excite stay.
@@ -177,7 +177,7 @@ def _with_few_modes(reference: ErrorReference, fidelity: Fidelity, allowed_loss:
     return result
 
 
-def _description(reference: ErrorReference, fidelity: Fidelity) -> list[str]:
+def _description(reference: Reference, fidelity: Fidelity) -> list[str]:
     """Return descriptions of the physics that a fidelity computes, such as gas, rods and orders, for reports."""
     problem, mounting = reference.problem, reference.mounting
     orders = "every order" if fidelity.orders is None else f"orders to {fidelity.orders}"
@@ -197,7 +197,7 @@ def _description(reference: ErrorReference, fidelity: Fidelity) -> list[str]:
     return [*lines, f"{fidelity.samples} steps over the cycle"]
 
 
-def _omitted_parts(reference: ErrorReference, fidelity: Fidelity) -> list[OmittedPart]:
+def _omitted_parts(reference: Reference, fidelity: Fidelity) -> list[OmittedPart]:
     """Return the parts of the physics that a fidelity omits, with upper bounds of their effect on the objective."""
     parts = []
 

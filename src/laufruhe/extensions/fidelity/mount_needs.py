@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.fidelity.automatic import GAS, ROD, Choice, OmittedPart, mode_names
+from laufruhe.extensions.fidelity.choice import GAS, ROD, Choice, OmittedPart, mode_names
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array

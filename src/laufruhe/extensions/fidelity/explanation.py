@@ -1,19 +1,45 @@
-"""Choice of physics for a problem, as text and as JSON."""
+"""Physics that a problem needs, as text and as JSON."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
 
-from laufruhe.fidelity.automatic import Choice
+from laufruhe.extensions.fidelity.choice import Choice, choose
+from laufruhe.extensions.fidelity.mount_needs import needs
+from laufruhe.extensions.fidelity.trade import problem_with_objective, timed
 from laufruhe.present.numbers import trimmed
 from laufruhe.present.static_load import static_sentence
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import static_part
 from laufruhe.report.strict_json import strict
 
 
-def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
+def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
+    """Return a text on the physics that a problem needs, and a function that returns it as JSON."""
+    problem = problem_with_objective(path)
+    choice = choose(problem, tolerance) if problem.load_terms else needs(problem)
+    answer = (problem, choice, tolerance, _milliseconds(problem, choice))
+    return _as_text(*answer), lambda: _as_json(*answer)
+
+
+def _milliseconds(problem: Problem, choice: Choice) -> tuple[float, float]:
+    # of an evaluation with the physics that the objective needs, and with all of it
+    exact = problem.at(problem.fidelity.exact(problem.fidelity.samples))
+    needed = problem.at(choice.fidelity) if choice.numbers[0] else replace(problem, points=())
+    short, whole = (1e3 * timed(partial(_objective, variant))[1] for variant in (needed, exact))
+    return short, whole
+
+
+def _objective(problem: Problem) -> float:
+    return objective_value(problem, evaluate(problem))
+
+
+def _as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
     """Return the computed and neglected physics with reasons and cost, as text.
 
     One evaluation takes `milliseconds` with the chosen and with the exact physics.
@@ -46,8 +72,8 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
     return "\n".join(lines) + "\n"
 
 
-def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
-    """Return the content of `as_text` as JSON."""
+def _as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
+    """Return the content of the text as JSON."""
     part = static_part(problem, evaluate_start(problem)) if problem.load_terms else None
     return strict({
         "problem": problem.name,

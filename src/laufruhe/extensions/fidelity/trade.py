@@ -9,14 +9,16 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import count, islice
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
 import laufruhe
-from laufruhe.errors import ModelError, SolverError, plural
-from laufruhe.fidelity.automatic import GAS, ROD
-from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, reference
+from laufruhe.errors import ModelError, SolverError, plural, refused
+from laufruhe.extensions.fidelity.choice import GAS, ROD
+from laufruhe.extensions.fidelity.reference import Reference, reference
+from laufruhe.files.reader import load
 from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
@@ -24,6 +26,7 @@ from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import forget
 from laufruhe.physics.uneven_speed import crank_motion
+from laufruhe.problem.error_bounds import REFERENCE_SAMPLES
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -118,6 +121,15 @@ class Trade:
     is_complete: bool = True
 
 
+def problem_with_objective(path: Path) -> Problem:
+    """Read a problem, and refuse one without an objective."""
+    problem = load(path)
+    if not problem.objective:
+        rule = "is missing, and the accuracy of a fidelity is that of the objective"
+        raise refused("objective", "", rule, "add [objective] or mounts", path)
+    return problem
+
+
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
     """Return time, error and regret of every model fidelity for a problem; `ModelError` without an objective.
 
@@ -129,7 +141,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     if len(problem.ranks) > 1:
         left_out.insert(0, f"The trade takes the first of {len(problem.ranks)} objectives.")
     problem = problem.changed(ranks=(), extras=())
-    scale, rows, is_complete = ErrorReference.of(problem), list[TradeRow](), False
+    scale, rows, is_complete = Reference(problem), list[TradeRow](), False
     batch = Batch(problem)
     with working_on(SERIAL):
         for name, variant in ladder(scale):
@@ -156,7 +168,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     return Trade(problem, tuple(rows), value, minimum, flywheel, tuple(left_out), is_complete)
 
 
-def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
+def ladder(scale: Reference) -> list[tuple[str, Problem]]:
     """Return the fidelities that a trade compares, as pairs (name, problem at this fidelity) (F13).
 
     `scale` is the reference of the problem.
@@ -236,7 +248,7 @@ class Batch:
         return spent, float(np.max(np.abs(values - self._exact) / np.where(self._exact > 0.0, self._exact, math.inf)))
 
 
-def measured(name: str, variant: Problem, scale: ErrorReference, batch: Batch) -> TradeRow:
+def measured(name: str, variant: Problem, scale: Reference, batch: Batch) -> TradeRow:
     """Measure a fidelity, all but its regret."""
     truth = objective_value(variant, scale.best)
     initial = evaluate_start(variant)

@@ -1,18 +1,39 @@
-"""Report on time and error of every fidelity, with a recommendation."""
+"""Pages on time and error of every fidelity, with a recommendation."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from pathlib import Path
+from typing import TextIO
 
+from laufruhe.cli.screen import typed
+from laufruhe.errors import SolverError, refused
+from laufruhe.extensions.fidelity.trade import (
+    KEEPS,
+    REFERENCE_NAME,
+    Trade,
+    TradeRow,
+    is_open,
+    problem_with_objective,
+    trade,
+)
+from laufruhe.extensions.fidelity.trade_picture import figure as picture_of
+from laufruhe.extensions.fidelity.trade_picture import has_picture
+from laufruhe.numerics.budget import is_time_over
+from laufruhe.plots.style import as_svg, save
 from laufruhe.present.numbers import DASH, figure, fixed, number
 from laufruhe.present.static_load import static_sentence
 from laufruhe.present.tables import Table
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.report import files
 from laufruhe.report.document import Block, Code, Document, Illustration, Paragraph
+from laufruhe.report.screen import show_document
 from laufruhe.report.strict_json import strict
-from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Trade, TradeRow, is_open
+from laufruhe.report.web_page import as_html
 
 ALIKE, WITHIN, SMALLEST = 1.3, 1e-3, 1e-4
 """Factor between times that count as equal, error of a good choice, and smallest share that is stated."""
@@ -30,6 +51,52 @@ COLUMNS = (
     "**Regret bound**: what `solve` states of it. A design that breaks a limit by more than 0.1 % in the exact "
     "model shows that excess instead. `auto` computes all physics in a solve, and takes fewer samples for many designs."
 )
+
+
+def traded(
+    paths: Sequence[Path], folder: Path, say: Callable[[str], None]
+) -> tuple[Callable[[TextIO], None], Callable[[], str]]:
+    """Measure time and error of every fidelity for each problem, and write its pages and picture.
+
+    Return a function that prints the pages, and one that returns the measurements as JSON.
+    """
+    problems = [problem_with_objective(path) for path in paths]
+    for path, problem in zip(paths, problems, strict=True):
+        if Kind.FLYWHEEL in open_kinds(problem):
+            rule = "is open, but fidelities are compared for a fixed flywheel only"
+            raise refused("flywheel", "", rule, "fix the flywheel", path)
+    trades, documents = list[Trade](), list[Document]()
+    for path, problem in zip(paths, problems, strict=True):
+        try:
+            trades.append(trade(problem, lambda text, name=problem.name: say(f"{name}: {text}")))  # type: ignore[misc]
+        except SolverError:
+            if not trades or not is_time_over():
+                raise
+            what = f"{len(trades)} of {len(problems)} problems, whose pages are in {folder}"
+            raise SolverError(f"the time limit ended the trade after {what}; raise the time limit") from None
+        documents.append(_written(path, trades[-1], folder))
+
+    def show(stream: TextIO) -> None:
+        for document, measured in zip(documents, trades, strict=True):
+            show_document(document, stream, folder, f"{measured.problem.name}.html")
+
+    return show, lambda: "[" + ",\n".join(as_json(measured).strip() for measured in trades) + "]\n"
+
+
+def _written(path: Path, measured: Trade, folder: Path) -> Document:
+    """Write the pages of a trade and the picture if there is one; return the document without it."""
+    name, command = measured.problem.name, typed("laufruhe", "trade", str(path))
+    names = [f"{name}.{end}" for end in ("md", "png", "html")]
+    with files.staged(files.FileSet(folder, "--out", "trade", names, adds=True)) as stage:
+        pictures = dict[str, str]()
+        if has_picture(measured):
+            picture = picture_of(measured)
+            save(picture, stage / f"{name}.png")
+            pictures[name] = as_svg(picture)
+        document = trade_document(measured, next(iter(pictures), None), command)
+        files.write(stage / f"{name}.md", document.as_markdown(".png"))
+        files.write(stage / f"{name}.html", as_html(document, pictures))
+    return document
 
 
 def trade_document(trade: Trade, picture: str | None, command: str) -> Document:

@@ -1,1 +1,0 @@
-"""Automatic choice of fidelity, its explanation, and error bounds of cheaper models."""
