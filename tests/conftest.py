@@ -88,4 +88,4 @@ def small_trade(monkeypatch: pytest.MonkeyPatch) -> None:
     """A trade calls each fidelity once, for a few designs and scenes: for tests that ask for no times or memory."""
     small = {"_MAX_REPEATS": 1, "DESIGNS": 100, "SCENES": 1, "peak_memory": lambda _: 1}
     for name, value in small.items():
-        monkeypatch.setattr(f"laufruhe.studies.trade.{name}", value)
+        monkeypatch.setattr(f"laufruhe.extensions.fidelity.trade.{name}", value)

@@ -23,7 +23,7 @@ import numpy as np  # noqa: E402
 from pages import PAGES, ROOT, publish, spent  # noqa: E402
 
 from laufruhe import load  # noqa: E402
-from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE  # noqa: E402
+from laufruhe.files.fidelity import DEFAULT_TOLERANCE  # noqa: E402
 from laufruhe.load_models.batch import prepare  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import build, inline  # noqa: E402

@@ -22,17 +22,9 @@ from pages import PAGES, processor_seconds, publish, spent
 
 import laufruhe
 from laufruhe.errors import counted
-from laufruhe.fidelity.error_bounds import ErrorReference
-from laufruhe.files.toml_text import toml_text
-from laufruhe.numerics.cores import processors
-from laufruhe.present.numbers import DASH, fixed
-from laufruhe.present.tables import Table
-from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import open_kinds
-from laufruhe.problem.problem import Problem
-from laufruhe.report import trade as report
-from laufruhe.report.document import Bullets, Document, Paragraph
-from laufruhe.studies.trade import (
+from laufruhe.extensions.fidelity import trade_report as report
+from laufruhe.extensions.fidelity.reference import Reference
+from laufruhe.extensions.fidelity.trade import (
     FASTER,
     KEEPS,
     NO_GAS,
@@ -46,6 +38,14 @@ from laufruhe.studies.trade import (
     measured,
     trade,
 )
+from laufruhe.files.toml_text import toml_text
+from laufruhe.numerics.cores import processors
+from laufruhe.present.numbers import DASH, fixed
+from laufruhe.present.tables import Table
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import open_kinds
+from laufruhe.problem.problem import Problem
+from laufruhe.report.document import Bullets, Document, Paragraph
 from problem_files import PROBLEMS
 
 SHOWN = (
@@ -112,7 +112,7 @@ def separate_calls() -> list[str]:
     ]
     for name in COMPARED:
         problem = laufruhe.load(PROBLEMS / f"{name}.toml")
-        scale, batch = ErrorReference.of(problem), Batch(problem)
+        scale, batch = Reference(problem), Batch(problem)
         (variant,) = (variant for rung, variant in ladder(scale) if rung == "auto 0.001")
         calls: dict[str, Callable[[], float]] = {
             "evaluation": lambda own=variant: min(spent(lambda: laufruhe.evaluate(own)) for _ in range(30)),

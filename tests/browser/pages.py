@@ -68,7 +68,7 @@ def _evaluated(folder: Path) -> Path:
 
 def _traded(folder: Path) -> Path:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("laufruhe.studies.trade._MAX_REPEATS", 1)
+        patch.setattr("laufruhe.extensions.fidelity.trade._MAX_REPEATS", 1)
         _run("trade", written(folder, scenes.GIVEN), "--out", folder / "out")
     return folder / "out" / "scene.html"
 

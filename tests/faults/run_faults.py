@@ -16,9 +16,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import laufruhe.cli.fidelity
 import laufruhe.cli.solve
-import laufruhe.cli.study  # noqa: F401
+import laufruhe.cli.study
+import laufruhe.extensions.fidelity.explanation  # noqa: F401
 from faults import harness
 from laufruhe.numerics.cores import processors
 

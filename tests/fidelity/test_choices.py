@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import random
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -14,24 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-import laufruhe
 import tractor
 from cli import scenes
 from fidelity.scenes import random_elastic_problem, random_problem
 from laufruhe.errors import InputError, ModelError
-from laufruhe.fidelity.automatic import choose
-from laufruhe.fidelity.error_bounds import reference
-from laufruhe.fidelity.options import OPTIONS
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.reader import load
-from laufruhe.machine import OperatingPoint, SliderCrank
-from laufruhe.machine.bodies import Motion
-from laufruhe.numerics.norms import NORMS
+from laufruhe.machine import OperatingPoint
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.problem import channels
+from laufruhe.problem.error_bounds import REFERENCE_SAMPLES
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import Term
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from problem_files import written
@@ -107,60 +97,6 @@ def _shuffled(rng: random.Random, parts: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(out)
 
 
-THREADS = """
-from laufruhe import load, solve
-from laufruhe.fidelity.automatic import choose
-found = solve(load("problems/tractor-four-lanchester.toml"))
-print(found.objective.value, found.certificate.lower_bound, choose(found.problem, 1e-3).error_estimate)
-"""
-
-
-@pytest.mark.slow
-def test_threads_of_the_machine_change_a_rounding() -> None:
-    """Optimum, bound and estimate to a rounding, whatever the threads of its libraries."""
-    count = "3" if os.environ.get(NAMES[0]) == "1" else "1"
-    answer = subprocess.run(
-        [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True, cwd=ROOT,
-        env={**os.environ, **dict.fromkeys(NAMES, count)},
-    ).stdout  # fmt: skip
-    found = laufruhe.solve(load(PROBLEMS / "tractor-four-lanchester.toml"))
-    here = [found.objective.value, found.certificate.lower_bound, choose(found.problem, 1e-3).error_estimate]
-    assert [float(word) for word in answer.split()] == pytest.approx(here, rel=1e-11)
-
-
-NAMES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
-
-
-def test_automatic_finds_what_is_not_there() -> None:
-    text = "\n".join(part.what for part in choose(load(PROBLEMS / "tractor-six.toml"), 1e-2).left_out)
-    # an open shaft may drive what nothing drives now
-    assert "loads Fx\n" in text
-    assert "2, 2.5" in text
-    assert "1 of 2 parts of the cycle" in text
-
-
-def test_gas_that_the_objective_cannot_see_is_dropped() -> None:
-    engine = replace(tractor.engine((0, 180, 180, 0)), mounts=())
-    from laufruhe.problem.measure import Measure
-
-    force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
-    choice = choose(tractor.problem(engine, [], tractor.GAS, objective=(force,)), 1e-3)
-    assert not choice.fidelity.gas
-    assert choice.error_estimate <= 1e-3
-    # of a force no gas loads, everything is told from the rod alone
-    assert choice.fidelity.orders is not None
-    assert choice.fidelity.orders <= 8
-
-
-def test_balanced_objective_of_zero() -> None:
-    engine = replace(tractor.engine((0, 120, 240, 240, 120, 0)), mounts=())
-    from laufruhe.problem.measure import Measure
-
-    force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"], orders=(1.0, 2.0)))
-    choice = choose(tractor.problem(engine, [], objective=(force,)), 1e-3)
-    assert choice.error_estimate < 1e-9
-
-
 def _with(text: str, table: str) -> str:
     return text + "\n[fidelity]\n" + table
 
@@ -170,7 +106,8 @@ def test_solve_within_a_tolerance(tolerance: float, tmp_path: Path) -> None:
     text = _with(scenes.TIGHT, f'kinematics = "auto"\ntolerance = {tolerance}')
     problem = load(written(tmp_path, text))
     result = solve(problem)
-    truth = objective_value(problem, reference(problem, result.final.engine))
+    exact = problem.at(problem.fidelity.exact(REFERENCE_SAMPLES))
+    truth = objective_value(problem, evaluate(exact, result.final.engine))
     assert result.objective is not None
     assert result.error_estimate <= 1.05 * tolerance
     assert abs(result.objective.value - truth) <= result.error_estimate * truth * 1.01
@@ -206,27 +143,5 @@ def test_no_orders_is_refused() -> None:
 
 
 def test_every_choice_has_its_option() -> None:
-    """What a fidelity holds, a file may say, and one object answers for."""
-    keys = [option.key for option in OPTIONS]
-    assert sorted([*keys, "tolerance"]) == sorted(field.name for field in fields(Fidelity))
-    assert set(FidelityTable.model_fields) == {*keys, "tolerance"}
-    assert all(hasattr(Fidelity(), key) for key in keys)
-
-
-class Swinging(SliderCrank):
-    """Something more turns to and fro than the rod that is a number."""
-
-    def motion(self, lib: Any, alpha: Any) -> Motion:
-        plain = super().motion(lib, alpha)
-        return Motion(plain.points, (*plain.swings, (0.02, (0.3 * lib.cos(alpha), -0.3 * lib.sin(alpha)))))
-
-
-def test_rods_of_any_mechanism_count() -> None:
-    """Whether rods have inertia of their own is asked of how they move, not of one mechanism's number."""
-    # no even star, which would cancel the swing
-    engine = tractor.engine((0, 90, 200))
-    own = [{field.name: getattr(part, field.name) for field in fields(part)} for part in engine.slider_cranks]
-    swinging = replace(engine, slider_cranks=tuple(Swinging(**numbers) for numbers in own))
-    for one, is_there in ((engine, False), (swinging, True)):
-        choice = choose(tractor.problem(one, []), 1e-6)
-        assert ("inertia of the rods beyond that of two masses" in choice.description) is is_there
+    """What a fidelity holds, a file may say."""
+    assert set(FidelityTable.model_fields) == {field.name for field in fields(Fidelity)}

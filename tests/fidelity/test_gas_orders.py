@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from cli import scenes
-from fidelity.scenes import finer, random_elastic_problem, random_problem
+from fidelity.scenes import random_elastic_problem, random_problem
 from lanes import first_fast
-from laufruhe.errors import InputError, ModelError, UncarriedLoadError
-from laufruhe.fidelity.error_bounds import ErrorReference, reference
+from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load
 from laufruhe.load_models import uneven_model
 from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
@@ -24,7 +23,6 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
-from laufruhe.studies.trade import ladder
 from problem_files import PROBLEMS, written
 
 EVERY = 10_000
@@ -33,20 +31,6 @@ EVERY = 10_000
 def _scene(make, seed: int) -> Problem:
     """Rigid or elastic, even or uneven throws, rows and vees, two- and four-stroke, always with gas."""
     return make(random.Random(40_000 + seed), gas=True)
-
-
-@pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
-@pytest.mark.parametrize("seed", first_fast(range(30), 6, 7))
-def test_estimate_is_not_below_the_error(make, seed: int) -> None:
-    rng, problem = random.Random(seed), _scene(make, seed)
-    fidelity = Fidelity(samples=rng.choice([96, 360, 720]), gas_orders=rng.choice([1, 2, 4, 8, 12, 24]))
-    own = replace(problem, fidelity=replace(fidelity, orders=rng.choice([None, None, 16]), gas_samples=1440))
-    try:
-        found, best = evaluate(own), reference(own)
-    except UncarriedLoadError:
-        return
-    value, truth = objective_value(own, found), objective_value(problem, evaluate(finer(problem, 7001)))
-    assert abs(value - truth) <= ErrorReference(own, best).error_of(found) * max(value, 1e-300)
 
 
 @pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
@@ -97,18 +81,6 @@ def _roll_of_star(fidelity: Fidelity) -> dict[float, complex]:
     return dict(zip(lines.orders.tolist(), (real + 1j * imaginary).tolist(), strict=True))
 
 
-def test_stars_keep_the_choice() -> None:
-    """A star of an open crank is evaluated with it, within the bound."""
-    problem = load(PROBLEMS / "inline-five-uneven-gas.toml").at(Fidelity(samples=720, gas_orders=4))
-    assert problem.phasing is not None
-    throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
-    star = problem.phasing.problem_of(Candidate(throws, (1, 2, 4, 5, 3)))
-    assert star.fidelity.gas_orders == 4
-    found, best = evaluate(star), reference(star)
-    value, truth = objective_value(star, found), objective_value(star, best)
-    assert 0.0 < abs(value - truth) <= ErrorReference(star, best).error_of(found) * value
-
-
 def test_from_a_file(tmp_path: Path) -> None:
     text = (PROBLEMS / "tractor-four-lanchester.toml").read_text(encoding="utf-8") + "\n[fidelity]\ngas_orders = 12\n"
     problem = load(written(tmp_path, text))
@@ -124,11 +96,3 @@ def test_from_a_file(tmp_path: Path) -> None:
         load(written(tmp_path, scenes.SHAKING_ONLY + "\n[fidelity]\ngas_orders = 3\n"))
     with pytest.raises(ModelError, match="gas orders"):
         Fidelity(gas_orders=0)
-
-
-def test_a_trade_tries_it_where_there_is_gas() -> None:
-    rungs = dict(ladder(ErrorReference.of(_scene(random_problem, 3))))
-    assert rungs["exact, gas to order 12, 720 steps"].fidelity.gas_orders == 12
-    assert not any(
-        "gas to order" in name for name, _ in ladder(ErrorReference.of(random_problem(random.Random(1), gas=False)))
-    )

@@ -16,13 +16,13 @@ import laufruhe
 from cli import scenes
 from fidelity.scenes import random_problem
 from lanes import first_fast
-from laufruhe.fidelity.error_bounds import regret_bound, signals
 from laufruhe.machine import Rotor, Shaft
 from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem import channels
 from laufruhe.problem.decision import Decision, Kind, RotorDrive
 from laufruhe.problem.dependence import keeps_omitted, open_kinds
+from laufruhe.problem.error_bounds import regret_bound, signals
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem

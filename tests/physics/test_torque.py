@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import laufruhe
-from laufruhe.fidelity.error_bounds import ErrorReference, reference
+from laufruhe.extensions.fidelity.reference import Reference, reference
 from laufruhe.machine import Arms, Engine, Rim
 from laufruhe.machine.flywheel import GRAVITY
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
@@ -277,5 +277,5 @@ def test_two_orders_reach_the_torque() -> None:
     assert errors[1] == pytest.approx(errors[0] / 16.0, rel=0.3)
     assert errors[2] == pytest.approx(errors[1] / 16.0, rel=0.1)
     asked = problem.changed(objective=(Term(Measure(*MEASURES["rms crank torque"])),), decisions=(), limits=())
-    scale = ErrorReference(asked, reference(asked))
+    scale = Reference(asked, reference(asked))
     assert 1e-3 < scale.relative_change(Fidelity("two-order", 720)) < 0.2

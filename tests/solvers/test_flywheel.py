@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.cli.fidelity import explained, traded
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.fidelity.explanation import explained
+from laufruhe.extensions.fidelity.trade_report import traded
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Flywheel, Rim
 from laufruhe.problem.evaluation import evaluate

@@ -14,6 +14,7 @@ import pytest
 
 import moving_masses as mm
 from laufruhe.errors import InputError
+from laufruhe.extensions.fidelity.trade import trade
 from laufruhe.files.reader import load
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.problem.evaluation import evaluate
@@ -22,7 +23,6 @@ from laufruhe.report.sections import tables_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.lexicographic import solve_lexicographic
 from laufruhe.solvers.result import Status
-from laufruhe.studies.trade import trade
 from problem_files import changed, loaded
 from ready import solved
 

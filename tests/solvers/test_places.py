@@ -13,13 +13,13 @@ from scipy.optimize import minimize
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.fidelity.trade import trade
 from laufruhe.machine import Engine
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.boxes.places import PlaceSearch, _Box
 from laufruhe.solvers.conclusion import evaluate_design
-from laufruhe.studies.trade import trade
 from problem_files import READY
 
 HEIGHTS = next(path for path in READY if path.stem == "tractor-four-shaft-heights")

@@ -127,7 +127,7 @@ def test_a_trade_keeps_what_is_measured(tmp_path: Path, monkeypatch: pytest.Monk
     assert "time limit" in stopped.stderr
     assert not out.exists()
     asked = iter(range(100))
-    monkeypatch.setattr("laufruhe.studies.trade.is_time_over", lambda: next(asked) >= 3)
+    monkeypatch.setattr("laufruhe.extensions.fidelity.trade.is_time_over", lambda: next(asked) >= 3)
     some = CliRunner().invoke(app, ["trade", str(path), "--out", str(out)])
     assert some.exit_code == 0
     assert "Stopped at the time limit" in (out / "scene.md").read_text(encoding="utf-8")

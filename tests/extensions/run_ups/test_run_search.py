@@ -11,11 +11,12 @@ from scipy.integrate import solve_ivp
 
 import laufruhe
 from laufruhe.errors import LaufruheError
+from laufruhe.extensions.fidelity.reference import Reference
+from laufruhe.extensions.fidelity.trade import ladder
 from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.peaks import RunPeaks
 from laufruhe.extensions.run_ups.runs import run_loads, runs_of
-from laufruhe.fidelity.error_bounds import ErrorReference
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
@@ -26,7 +27,6 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status
-from laufruhe.studies.trade import ladder
 from problem_files import PROBLEMS
 
 READY = PROBLEMS / "soft-single-run-up-mounts.toml"
@@ -333,8 +333,8 @@ def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
 def test_fidelities_of_a_run_up_have_its_loads() -> None:
     """Without operating points there is no run."""
     asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
-    assert all(own.points for _, own in ladder(ErrorReference.of(limited(**asked))))
-    assert any(not own.points for _, own in ladder(ErrorReference.of(limited(objective={"minimise": "static sag"}))))
+    assert all(own.points for _, own in ladder(Reference(limited(**asked))))
+    assert any(not own.points for _, own in ladder(Reference(limited(objective={"minimise": "static sag"}))))
 
 
 @pytest.mark.slow

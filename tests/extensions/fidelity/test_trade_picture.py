@@ -10,8 +10,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from cli import scenes
-from laufruhe.plots import trade
-from laufruhe.studies.trade import Trade, TradeRow
+from laufruhe.extensions.fidelity import trade_picture
+from laufruhe.extensions.fidelity.trade import Trade, TradeRow
 from picture_faults import faults_of
 
 ROWS = 16
@@ -31,7 +31,7 @@ def _trade(errors: list[float]) -> Trade:
     "errors", [[0.0] * (ROWS - 1) + [1.0], [1e-3] * ROWS, [10.0 ** (-0.4 * k) for k in range(ROWS)], [0.02]]
 )
 def test_names_cover_neither_each_other_nor_the_panel(errors: list[float]) -> None:
-    figure = trade.figure(_trade(errors))
+    figure = trade_picture.figure(_trade(errors))
     assert faults_of(figure) == []
     canvas = cast(FigureCanvasAgg, figure.canvas)
     canvas.draw()
@@ -48,6 +48,6 @@ def test_names_cover_neither_each_other_nor_the_panel(errors: list[float]) -> No
 
 def test_names_stand_in_the_order_of_their_errors() -> None:
     errors = [1e-2, 1e-5, 1e-2, 1e-4, 0.5]
-    figure = trade.figure(_trade(errors))
+    figure = trade_picture.figure(_trade(errors))
     heights = {error: text.get_position()[1] for error, text in zip(errors, figure.axes[0].texts, strict=True)}
     assert all(heights[low] < heights[high] for low, high in pairwise(sorted(heights)))

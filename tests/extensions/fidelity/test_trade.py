@@ -11,15 +11,14 @@ import pytest
 
 import laufruhe
 from cli import scenes
-from laufruhe.cli.fidelity import traded
 from laufruhe.errors import InputError, SolverError
-from laufruhe.fidelity.error_bounds import reference
+from laufruhe.extensions.fidelity.reference import reference
+from laufruhe.extensions.fidelity.trade import Trade, TradeRow, peak_memory, timed, trade
+from laufruhe.extensions.fidelity.trade_report import advice, choices, trade_document, traded
 from laufruhe.files.reader import load
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.report.trade import advice, choices, trade_document
-from laufruhe.studies.trade import Trade, TradeRow, peak_memory, timed, trade
 from problem_files import PROBLEMS
 
 
@@ -56,7 +55,7 @@ def test_advice_is_of_one_solve_and_of_many_designs() -> None:
 def test_a_call_is_repeated_unless_it_takes_seconds(first: float, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A first call fills caches, which a user's further calls have."""
     clock = [0.0]
-    monkeypatch.setattr("laufruhe.studies.trade.time.process_time", lambda: clock[0])
+    monkeypatch.setattr("laufruhe.extensions.fidelity.trade.time.process_time", lambda: clock[0])
     count = 0
 
     def work() -> None:
@@ -108,8 +107,8 @@ def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pyt
             raise SolverError("the time limit ended before any fidelity was measured; raise the time limit")
         return trade(problem)
 
-    monkeypatch.setattr("laufruhe.cli.fidelity.trade", out_of_time)
-    monkeypatch.setattr("laufruhe.cli.fidelity.is_time_over", lambda: True)
+    monkeypatch.setattr("laufruhe.extensions.fidelity.trade_report.trade", out_of_time)
+    monkeypatch.setattr("laufruhe.extensions.fidelity.trade_report.is_time_over", lambda: True)
     with pytest.raises(SolverError, match="ended the trade after 1 of 2 problems"):
         traded([quick, never], tmp_path / "trade", lambda _: None)
     assert (tmp_path / "trade/boxer-four.md").is_file()
