@@ -24,7 +24,6 @@ WORDS = {
     "solvers": "methods propose designs",
     "prove": "lower bounds and certificates",
     "load_models": "V0 + B x from decisions to loads",
-    "fidelity": "how exact, with an error bound",
     "problem": "decisions, measures, limits",
     "physics": "one file a phenomenon",
     "machine": "layouts, drives, rotors, mounts",

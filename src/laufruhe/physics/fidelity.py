@@ -1,6 +1,6 @@
 """Physics options of a model, each independent of the others (F1).
 
-`fidelity.options` says how a problem file sets each field, `fidelity.automatic` when it pays.
+`files.fidelity` reads each from a problem file; `extensions.fidelity.choice` says when it pays.
 """
 
 from __future__ import annotations
