@@ -354,18 +354,6 @@ def test_evaluate_and_check_need_no_solver(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.slow
-def test_the_process_ends_with_the_status(tmp_path: Path) -> None:
-    done = in_a_process("check", str(tmp_path / "missing.toml"))
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-    path = written(tmp_path, scenes.GIVEN)
-    done = in_a_process("evaluate", str(path), "--out", str(tmp_path / "out"), "--no-plots")
-    assert done.returncode == 0
-    # a pipe gets neither a spinner nor colours
-    assert "\x1b" not in done.stdout + done.stderr
-
-
 def test_check_answers_in_json_and_makes_no_folder(here: Path) -> None:
     """`check --json -` prints the design as given, pure JSON, and leaves nothing behind."""
     answer = run("check", scenes.READY, "--json", "-")

@@ -88,10 +88,13 @@ def test_closed_streams(words: str, status: int, said: str, here: Path) -> None:
 
 @pytest.mark.slow
 def test_files_do_not_take_the_numbers_of_closed_streams(here: Path) -> None:
-    """What is said would stand in the middle of them."""
+    """What is said would stand in the middle of them; a pipe gets neither a spinner nor colours."""
     shutil.copy(SINGLE, here / "p.toml")
-    for out, streams in (("open", ">/dev/null"), ("closed", "-q >&- 2>&- <&-")):
-        assert shell(f"evaluate p.toml --no-plots --out {out} {streams}", here).returncode == 0
+    for out, streams in (("open", ""), ("closed", "-q >&- 2>&- <&-")):
+        told = shell(f"evaluate p.toml --no-plots --out {out} {streams}", here)
+        assert told.returncode == 0
+        assert "\x1b" not in told.stdout + told.stderr
+        assert bool(told.stdout) == (out == "open")
     names = sorted(path.name for path in (here / "open").iterdir())
     assert sorted(path.name for path in (here / "closed").iterdir()) == names
     for name in (name for name in names if name.endswith(".csv")):

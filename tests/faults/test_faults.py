@@ -50,7 +50,7 @@ def spoilt(folder: Path, old: str, new: str) -> Path:
     return written(folder, scenes.GIVEN.replace(old, new))
 
 
-DAMAGED = [("check", 526, 100), ("evaluate", 3000, 15), ("explain", 4100, 15), ("check", 0, 800)]
+DAMAGED = [("check", 526, 60), ("evaluate", 3000, 15), ("explain", 4100, 15), ("check", 0, 800)]
 
 
 @pytest.mark.parametrize(("verb", "first", "count"), first_fast(DAMAGED, 0, 3))

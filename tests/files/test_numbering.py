@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from random import Random
 from typing import Any, ClassVar
 
@@ -17,6 +18,7 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.problem import Problem
 from laufruhe.report.wording import fired
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.throws.throw_windows import firing_bounds, windows_of
 
 Table = dict[str, Any]
@@ -129,6 +131,20 @@ def test_a_counter_clockwise_engine_is_the_mirror_image() -> None:
     assert any("y points to the right" in line for line in left.assumptions)
 
 
+def open_vee(deviation: int) -> tuple[Table, Table]:
+    engine = {"layout": "vee", "bank_angle": 90, "split_pin_angle": 30, "cylinders": 6, "throws": "open"}
+    tables: Table = {"objective": {"minimise": "rms rocking couple"}}
+    if deviation:
+        tables["phasing"] = {"intervals": {"largest_deviation": f"{deviation} deg"}}
+    return engine, tables
+
+
+@cache
+def plain_result(deviation: int) -> Result:
+    engine, tables = open_vee(deviation)
+    return laufruhe.solve(loaded(engine, **tables))
+
+
 @pytest.mark.parametrize(
     "keys",
     [
@@ -142,11 +158,8 @@ def test_a_counter_clockwise_engine_is_the_mirror_image() -> None:
 @pytest.mark.parametrize("deviation", [0, pytest.param(30, marks=pytest.mark.slow)])
 def test_an_open_crank_is_decided_in_the_numbers_of_the_file(keys: Table, deviation: int) -> None:
     """The optimum is that of plain numbers; its order and throws, written into the file, give it again."""
-    engine = {"layout": "vee", "bank_angle": 90, "split_pin_angle": 30, "cylinders": 6, "throws": "open"}
-    tables: Table = {"objective": {"minimise": "rms rocking couple"}}
-    if deviation:
-        tables["phasing"] = {"intervals": {"largest_deviation": f"{deviation} deg"}}
-    plain, found = (laufruhe.solve(loaded({**engine, **own}, **tables)) for own in ({}, keys))
+    engine, tables = open_vee(deviation)
+    plain, found = plain_result(deviation), laufruhe.solve(loaded({**engine, **keys}, **tables))
     assert plain.objective is not None
     assert found.objective is not None
     assert found.objective.value == pytest.approx(plain.objective.value, rel=1e-6)

@@ -171,8 +171,8 @@ def decoupled(tmp_path_factory):
 
 def test_the_least_shortfall_is_that_of_a_grid(decoupled):
     problem, result = decoupled
-    grid = np.geomspace(2e4, 4e6, 60)
-    values = np.full((60, 60), np.inf)
+    grid = np.geomspace(2e4, 4e6, 40)
+    values = np.full((40, 40), np.inf)
     for i, a in enumerate(grid):
         for j, b in enumerate(grid):
             energy = _share(problem, [a, b])

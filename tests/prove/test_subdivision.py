@@ -225,7 +225,7 @@ max = "6000 N"
 def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED["rms"], LIMITS)
     given = evaluate(problem)
-    low, high = boxes(problem, 120, 3)
+    low, high = boxes(problem, 60, 3)
     bounds, _ = StiffnessBoxes(problem, 0.0).bounds(low, high)
     generator = np.random.default_rng(4)
     allowed_ones = 0
@@ -236,7 +236,7 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
         broken |= any(design.value(limit.measure) > limit.maximum for limit in problem.load_limits)
         allowed_ones += not broken
         assert np.isfinite(bound) or broken
-    assert 20 < np.count_nonzero(np.isinf(bounds)) < 130
+    assert 10 < np.count_nonzero(np.isinf(bounds)) < 55
     assert allowed_ones > 5
 
 

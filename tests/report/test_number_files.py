@@ -26,7 +26,7 @@ from laufruhe.report.table_files import write_book, write_csv
 from laufruhe.report.tables import number_tables, write_tables
 from laufruhe.solvers import Result, evaluate_only
 from problem_files import PROBLEMS, loaded
-from ready import solved
+from ready import initial_tables, solved
 
 WHOLE = {"crank_stars", "decisions", "limits", "places", "modes", "orders"}
 """Sections whose numbers are files in full precision."""
@@ -209,8 +209,7 @@ def test_a_file_is_named_after_the_table_that_it_holds() -> None:
 
 @pytest.mark.slow
 def test_what_only_the_report_knows_is_a_file_too() -> None:
-    result = evaluate_only(load(PROBLEMS / "inline-five-torsion.toml"))
-    found = number_tables(result)
+    result, found = initial_tables("inline-five-torsion")
     assert "crankshaft-torque" in found
     assert set(found) <= {name.removesuffix(".csv") for name in result_files()}
     assert any(isinstance(cell, float) for row in found["crankshaft-torque"].rows for cell in row)

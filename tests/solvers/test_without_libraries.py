@@ -47,7 +47,7 @@ for call in loaded.to_cvxpy, loaded.to_casadi, scs, uneven:
         call()
     except laufruhe.SolverError as error:
         print(error)
-for words in (["solve", mounts], ["study", "sweep.toml"]):
+for words in (["solve", mounts, "--no-plots"], ["study", "sweep.toml"]):
     answer = CliRunner().invoke(app, [*words, "--out", folder + words[0]])
     print(answer.exit_code, answer.output.strip().rpartition("failed: ")[2] if answer.exit_code else "")
 import xarray

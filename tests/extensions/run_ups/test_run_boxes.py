@@ -192,7 +192,7 @@ def test_scipy_reaches_what_boxes_are_not_under() -> None:
     bounds = np.array([minimum(boxes.runs.under(measure, boxes.lower, boxes.upper)) for measure in OF_RUNS])
     inertia, gas = run_loads(problem.engine, problem.points[0], problem.fidelity)
     for box in range(2):
-        for x in boxes.designs(box, 4):
+        for x in boxes.designs(box, 2):
             told = [
                 run_through(boxes.model.mounting(x), inertia, gas, *each, 60, "DOP853", 1e-9)
                 for each in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))

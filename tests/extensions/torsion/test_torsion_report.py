@@ -9,7 +9,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-import laufruhe
 from laufruhe.extensions.torsion import modes_picture
 from laufruhe.extensions.torsion.facts import facts_of, speed_range, torque_over_speed
 from laufruhe.extensions.torsion.modes_picture import COLOURS
@@ -18,12 +17,9 @@ from laufruhe.plots import names
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections import tables_of
-from laufruhe.report.tables import number_tables
-from laufruhe.solvers import evaluate_only
 from laufruhe.solvers.result import Result
 from plots.test_every_picture import SEEN, lab
-from problem_files import PROBLEMS
-from ready import solved
+from ready import initial_tables, solved
 
 
 @pytest.fixture(scope="module")
@@ -119,8 +115,7 @@ def test_dots_of_a_picture_are_critical_speeds_on_the_lines_of_their_orders(resu
 
 @pytest.mark.slow
 def test_files_of_numbers_hold_what_is_drawn() -> None:
-    result = evaluate_only(laufruhe.load(PROBLEMS / "inline-five-torsion.toml"))
-    found = number_tables(result)
+    result, found = initial_tables("inline-five-torsion")
     assert {"crankshaft-modes", "strongest-critical-speeds-initial"} <= set(found)
     # at every speed of the curve the torque is that of the operating point, were it there
     sheet = found["twist-response"]
