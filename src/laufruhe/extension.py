@@ -118,6 +118,8 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "crankcase": "workshop",
         "receivers": "receivers",
         "frame": "receivers",
+        "choices": "parts_lists",
+        "parts_price": "parts_lists",
         "bob_weights": "balancing",
         "correction": "balancing",
         "measurements": "identification",
@@ -126,7 +128,9 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "layouts": {"rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke"},
-    "channels": dict.fromkeys(_OF_SIZES, "sizes") | dict.fromkeys(_OF_RECEIVERS, "receivers"),
+    "channels": dict.fromkeys(_OF_SIZES, "sizes")
+    | dict.fromkeys(_OF_RECEIVERS, "receivers")
+    | {"parts price": "parts_lists"},
 }
 """Extensions of this package by the names that they add to tables, for the complaint if one is not installed."""
 INSTALL = "install laufruhe with all its folders"

@@ -248,6 +248,8 @@ def _at_time_limit(problem: Problem, result: Result | None) -> Result:
             initial = evaluate_design(problem, problem.start)
             if (
                 problem.phasing is None
+                # extensions decide by other designs, or measure them otherwise
+                and not problem.extras
                 and max(initial.violation, violation_at_fine_sampling(problem, initial.evaluation)) <= FEASIBILITY_TOL
             ):
                 proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the initial design; {TIME_LIMIT_NOTE}")
