@@ -32,6 +32,7 @@ from laufruhe.extensions.parts_lists.lists import (
 from laufruhe.files.complaints import errors_in_file
 from laufruhe.files.reader import load_tables
 from laufruhe.numerics.witness import check_bound, is_over
+from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -47,8 +48,8 @@ from laufruhe.solvers.walk import check_by_walk
 
 MAX_NODES = 200_000
 """Largest number of subsets and combinations."""
-CLOSED_AT_ONCE, OPEN_AT_ONCE = 200, 4
-"""Largest subset whose combinations are solved one by one, without other open numbers and with some."""
+FEW, MANY = 4, 200
+"""Largest subset whose combinations are solved one by one: usually, and where only its bound is hard to compute."""
 BOXES = 64
 """Largest number of boxes for the bound of a subset."""
 _CHANGED = "a choice from lists of parts needs the problem of a file, and code has changed this one; change the file"
@@ -143,7 +144,6 @@ class _Search(BranchAndBound[Subset]):
         self.solved: dict[tuple[int, ...], Combination] = {}
         self.best: Result | None = None
         self.faults: list[str] = []
-        self.at_once = OPEN_AT_ONCE if problem.decisions else CLOSED_AT_ONCE
 
     def run(self, max_nodes: int) -> float:
         """Solve or exclude combinations until all are decided; return a lower bound of the objective over them."""
@@ -151,6 +151,13 @@ class _Search(BranchAndBound[Subset]):
         self.solve(tuple(rows[0] for rows in root))
         bound = self.bound(root) if self.whole > self.at_once else 0.0
         return self.divide((bound, root), max_nodes)
+
+    @cached_property
+    def at_once(self) -> int:
+        """Largest subset whose combinations are solved one by one without a bound of the subset."""
+        numbers = [(self.groups[c], c.side) for parts in self.lists for c in parts.columns]
+        is_easy = all(side or (moved and all(d.is_affine for d in moved)) for moved, side in numbers)
+        return FEW if is_easy or not all(d.is_affine for d in self.problem.decisions) else MANY
 
     def is_fathomed(self, node: OpenNode[Subset]) -> bool:
         """Return True if no combination of a subset is better than the best one."""
@@ -189,19 +196,18 @@ class _Search(BranchAndBound[Subset]):
         return self.lists[k].columns or (Column("", "", self.lists[k].prices, (("constraints", "max"),)),)
 
     @cached_property
-    def groups(self) -> dict[Column, tuple[str, ...]]:
-        """Names of the decisions that each column moves if it is open; empty if no bound holds for it."""
-        groups, usual = dict[Column, tuple[str, ...]](), {decision.name for decision in self.problem.decisions}
+    def groups(self) -> dict[Column, tuple[Decision, ...]]:
+        """Decisions that each column moves if it is open; none for a limit, and where no bound holds."""
+        groups, usual = dict[Column, tuple[Decision, ...]](), {decision.name for decision in self.problem.decisions}
         first = with_rows(self.tables, self.lists, ((0,),) * len(self.lists))
-        for parts, column in [(parts, column) for parts in self.lists for column in parts.columns]:
+        for parts, column in [(of, column) for of in self.lists for column in of.columns]:
             rows, alone = tuple(range(len(parts.sheet.rows))), replace(parts, columns=(column,))
             try:
                 decisions = _loaded(self.problem, with_rows(first, (alone,), (rows,))).decisions
             except LaufruheError:
                 decisions = ()
-            new = [decision for decision in decisions if decision.name not in usual]
-            is_bounded = not any(decision.address_drives for decision in new)
-            groups[column] = tuple(decision.name for decision in new) if is_bounded else ()
+            moved = tuple(decision for decision in decisions if decision.name not in usual)
+            groups[column] = () if any(decision.address_drives for decision in moved) else moved
         return groups
 
     def solve(self, rows: tuple[int, ...]) -> Combination:
@@ -262,12 +268,11 @@ class _Search(BranchAndBound[Subset]):
             return None
         problem = _loaded(self.problem, with_rows(self.tables, self.lists, subset))
         by_name = {decision.name: decision for decision in problem.decisions}
-        for names in moved:
+        for group in moved:
             # parts that take one row have one number
-            first, *others = (by_name[name] for name in names)
+            first, *others = (by_name[decision.name] for decision in group)
             if all((other.set, other.start) == (first.set, first.start) for other in others):
-                by_name = {name: decision for name, decision in by_name.items() if name not in names[1:]}
-                drives = (*first.drives, *(drive for other in others for drive in other.drives))
+                drives = tuple(itertools.chain(first.drives, *(by_name.pop(other.name).drives for other in others)))
                 by_name[first.name] = replace(first, drives=drives)
         search = replace(problem.search, starts=1, boxes=min(problem.search.boxes_or(BOXES), BOXES))
         limits = tuple(_wider(limit) for limit in problem.limits if limit.outside is None)
@@ -279,7 +284,7 @@ class _Search(BranchAndBound[Subset]):
         for parts, rows in zip(self.lists, subset, strict=True):
             distances = np.zeros(len(rows))
             for column in [column for column in parts.columns if column.varies(rows)]:
-                decision, numbers = values[self.groups[column][0]], np.array([column.values[row] for row in rows])
+                decision, numbers = values[self.groups[column][0].name], np.array([column.values[row] for row in rows])
                 share = (decision.value - decision.lower) / (decision.upper - decision.lower)
                 distances += ((numbers - numbers.min()) / np.ptp(numbers) - share) ** 2
             nearest.append(rows[int(np.argmin(distances))])
