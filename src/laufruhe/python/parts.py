@@ -218,6 +218,20 @@ class EngineParts(Parts):
         """
         return self._with("measurements", "measurement", keys_of(locals()))
 
+    def choice(
+        self, name: str, *, file: str, parts: Sequence[str] | None = None, sets: Table | None = None,
+        count: int | None = None,
+    ) -> Self:
+        """Return the engine with a choice. A part to choose: one row of a CSV file of parts that can be bought."""
+        return self._with("choices", "choice", keys_of(locals()))
+
+    def parts_price(self, *, total: Number) -> Self:
+        """Return the engine with parts price.
+
+        Price of the parts that the lists replace, in the currency of the lists.
+        """
+        return self._with("parts_price", "parts_price", keys_of(locals()))
+
     def frame(
         self, *, mass: Value, inertia: Values, centre_of_gravity: Values | None = None,
         inertia_products: Values | None = None, springs: Sequence[Table] | None = None,

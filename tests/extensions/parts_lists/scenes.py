@@ -109,8 +109,8 @@ def _add_price(count: int) -> Put:
 
 
 def _engine(random: Random) -> dict[str, Any]:
-    cylinders, throws, order = [
-        (1, [0], [1]), (2, [0, 180], [1, 2]), (3, [0, 240, 120], [1, 2, 3]), (4, [0, 180, 180, 0], [1, 3, 4, 2]),
+    throws, order = [
+        ([0], [1]), ([0, 180], [1, 2]), ([0, 240, 120], [1, 2, 3]), ([0, 180, 180, 0], [1, 3, 4, 2]),
     ][random.integers(4)]  # fmt: skip
     return {
         "title": "Random engine with parts from lists",
@@ -217,6 +217,8 @@ def _mount_list(random: Random, tables: dict[str, Any], group: Sequence[int], k:
 
 def _torsion(random: Random, tables: dict[str, Any], count: int) -> list[Lists]:
     """Add a torsional system, of which up to three parts come from lists."""
+    if len(tables["engine"]["throws"]) == 1:
+        tables["engine"] |= {"throws": [0, 180, 180, 0], "firing_order": [1, 3, 4, 2]}
     tables["torsion"] = {
         "throw_inertia": "0.006 kg m^2", "cylinder_damping": "0.3 N m s/rad", "loss_factor": 0.01,
         "crank": {"stiffness": "4e5 N m/rad", "diameter": "48 mm"},
@@ -277,7 +279,9 @@ def random_scene(seed: int) -> Scene:
     kind, count = seed % 4, int(random.integers(1, 4))
     _points(random, tables)
     if kind == 0:
-        tables["mounts"] = {"positions": [["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"], ["-600 mm", "0 mm", "0 mm"]]}  # noqa: E501
+        tables["mounts"] = {
+            "positions": [["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"], ["-600 mm", "0 mm", "0 mm"]]
+        }
         gears = [_gear(random, tables)] if random.random() < 0.4 else []
         lists = [*gears, *_weights(random, tables, max(count - len(gears), 1), int(random.integers(0, 2)))]
         quantity = ["rms mount force", "mean mount force", "maximum mount force", "rms shaking force"]

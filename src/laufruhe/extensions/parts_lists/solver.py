@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from laufruhe.errors import InputError, LaufruheError, ModelError, counted
+from laufruhe.errors import InputError, ModelError, SolverError, counted
 from laufruhe.extensions.parts_lists.lists import (
     Choices,
     Column,
@@ -52,6 +52,7 @@ FEW, MANY = 4, 200
 """Largest subset whose combinations are solved one by one: usually, and where only its bound is hard to compute."""
 BOXES = 64
 """Largest number of boxes for the bound of a subset."""
+_UNSOLVED = (InputError, ModelError, SolverError)
 _CHANGED = "a choice from lists of parts needs the problem of a file, and code has changed this one; change the file"
 
 
@@ -204,7 +205,7 @@ class _Search(BranchAndBound[Subset]):
             rows, alone = tuple(range(len(parts.sheet.rows))), replace(parts, columns=(column,))
             try:
                 decisions = _loaded(self.problem, with_rows(first, (alone,), (rows,))).decisions
-            except LaufruheError:
+            except _UNSOLVED:
                 decisions = ()
             moved = tuple(decision for decision in decisions if decision.name not in usual)
             groups[column] = () if any(decision.address_drives for decision in moved) else moved
@@ -217,7 +218,7 @@ class _Search(BranchAndBound[Subset]):
         value, bound, proof, reason = math.inf, 0.0, "not solved", ""
         try:
             result = self.decide(self._combined(rows))
-        except LaufruheError as error:
+        except _UNSOLVED as error:
             reason = str(error)
         else:
             bound, proof = _bound_of(result), str(result.status)
@@ -242,7 +243,7 @@ class _Search(BranchAndBound[Subset]):
         try:
             problem = self._relaxed(subset)
             result = None if problem is None else self.decide(problem)
-        except LaufruheError:
+        except _UNSOLVED:
             # an error proves nothing
             return 0.0
         if result is None:

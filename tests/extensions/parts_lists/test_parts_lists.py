@@ -1,0 +1,220 @@
+"""Parts from lists: against brute force over all rows, with every stop of the search, and bad lists."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from extensions.parts_lists.scenes import random_scene
+from lanes import first_fast
+from laufruhe.errors import BoundError, InputError, LaufruheError, SolverError
+from laufruhe.extensions.parts_lists import solver
+from laufruhe.extensions.parts_lists.lists import Choices, Outcome
+from laufruhe.extensions.parts_lists.section import SECTION
+from laufruhe.files.reader import load
+from laufruhe.numerics.witness import collected
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import methods, solve
+from laufruhe.solvers.result import Result, Status
+from problem_files import FOUR, MOUNTS
+
+CLOSE = 1e-6
+STOPS = (0, 1, 2, 5, 9, 20)
+POINT = '[[operating_points]]\nspeed = "2500 rpm"\n[objective]\nminimise = "rms mount force"\n'
+WEB = '[[counterweights]]\nname = "web"\nopposite_throw = 1\nradius = "60 mm"\nmass = "1 kg"\n'
+CHOICE = '[[choices]]\nname = "weight"\nfile = "w.csv"\nparts = ["web"]\n'
+ROWS = "name, mass [kg], price\nsmall, 0.5, 9\nmiddle, 1.5, 6\nlarge, 3.0, 4\n"
+
+
+def outcome_of(result: Result) -> Outcome:
+    choices = result.problem.extra(Choices)
+    assert choices is not None
+    assert choices.outcome is not None
+    return choices.outcome
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[..., Problem]:
+    def of(text: str = "", rows: str = ROWS, choice: str = CHOICE) -> Problem:
+        (tmp_path / "w.csv").write_text(rows, encoding="utf-8")
+        (tmp_path / "engine.toml").write_text(FOUR + MOUNTS + POINT + WEB + text + choice, encoding="utf-8")
+        return load(tmp_path / "engine.toml")
+
+    return of
+
+
+@pytest.mark.parametrize("seed", first_fast([2, 4, 1, *range(5, 100), 0, 3], 1, 3))
+def test_brute_force_finds_no_better_combination(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The value is the least of all combinations, and no bound is above it, whenever the search stops."""
+    scene = random_scene(seed)
+    values = scene.values()
+    best = min((value for value in values.values() if math.isfinite(value)), default=math.inf)
+    problem, known = scene.load(tmp_path), dict[int, Result]()
+
+    def decide(part: Problem) -> Result:
+        key = hash(repr((part.engine, part.decisions, part.limits, part.search)))
+        if key not in known:
+            known[key] = methods._solve_reduced(part)
+        return known[key]
+
+    # subsets are bounded before they are small too
+    for size in (solver.MANY, 2):
+        monkeypatch.setattr(solver, "FEW", min(solver.FEW, size))
+        monkeypatch.setattr(solver, "MANY", size)
+        for stop in (*STOPS, solver.MAX_NODES):
+            with collected() as contradictions:
+                result = solver.solve_choices(problem, decide, stop)
+            assert not contradictions
+            if math.isinf(best):
+                assert result.status in (Status.INFEASIBLE, Status.FAILED)
+                assert result.status is Status.FAILED or all(value == math.inf for value in values.values())
+                continue
+            bound = result.certificate.lower_bound if result.certificate is not None else 0.0
+            assert bound <= best * (1.0 + CLOSE)
+            assert result.status is not Status.INFEASIBLE
+            if result.status.has_design and result.objective is not None:
+                assert result.objective.value >= best * (1.0 - CLOSE)
+                assert values[outcome_of(result).solved[0].rows] == pytest.approx(result.objective.value, rel=CLOSE)
+        assert result.objective is not None or math.isinf(best)
+        assert result.objective is None or result.objective.value == pytest.approx(best, rel=CLOSE)
+
+
+def test_bounds_exclude_most_rows(read: Callable[..., Problem]) -> None:
+    rows = "name, mass [kg]\n" + "".join(f"w{k}, {0.05 * k + 0.1:.2f}\n" for k in range(60))
+    result = solve(read(rows=rows))
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    outcome = outcome_of(result)
+    assert outcome.whole == 60
+    assert len(outcome.solved) + outcome.excluded == 60
+    assert outcome.excluded > 40
+
+
+def test_price_is_a_limit_or_a_term(read: Callable[..., Problem]) -> None:
+    price = "[parts_price]\ntotal = 5\n"
+    free = solve(read(price))
+    dear = solve(read(price + '[[constraints]]\nlimit = "parts price"\nmax = 5\n'))
+    assert free.objective is not None
+    assert dear.objective is not None
+    assert dear["parts price"] == 4.0
+    assert dear.objective.value > free.objective.value
+
+
+def test_a_solver_that_stops_proves_nothing(read: Callable[..., Problem]) -> None:
+    """A combination without a result counts with a bound of zero, and never as infeasible."""
+    problem = read()
+
+    def decide(part: Problem) -> Result:
+        if part.decisions or any(rotor.name == "web" and abs(rotor.unbalance) < 0.05 for rotor in part.engine.rotors):
+            raise SolverError("stopped")
+        return methods._solve_reduced(part)
+
+    result = solver.solve_choices(problem, decide)
+    assert result.certificate is not None
+    assert result.certificate.lower_bound == 0.0
+    assert result.certificate.kind is Proof.LOCAL
+    assert "'small' (stopped)" in result.message
+
+    def never(_: Problem) -> Result:
+        raise SolverError("stopped")
+
+    assert solver.solve_choices(problem, never).status is Status.FAILED
+
+
+def test_no_time_gives_a_row_and_no_other_design(read: Callable[..., Problem]) -> None:
+    """The initial design is no row, so that it is no answer even if the time is over at once."""
+    result = solve(read(), time_limit=0.0)
+    assert result.status.has_design
+    (web,) = (rotor for rotor in result.final.engine.rotors if rotor.name == "web")
+    assert abs(web.unbalance) == pytest.approx(0.06 * 0.5)
+    failed = solve(
+        read('[[constraints]]\nlimit = "counterweight mass"\nmax = "1.2 kg"\n', rows=ROWS.replace("0.5", "2")),
+        time_limit=0.0,
+    )
+    assert not failed.status.has_design
+
+
+def test_a_broken_bound_is_reported(read: Callable[..., Problem]) -> None:
+    """A bound of a subset above a combination in it withholds the proof."""
+    rows = "name, mass [kg]\n" + "".join(f"w{k}, {0.2 * k + 0.1:.2f}\n" for k in range(12))
+    problem = read(rows=rows)
+
+    class Broken(solver._Search):
+        def bound(self, subset: Any) -> float:
+            return 1.5 * super().bound(subset)
+
+    with pytest.raises(BoundError):
+        Broken(problem, methods._solve_reduced).run(solver.MAX_NODES)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("", "0 rows"),
+        ("name, mass [kg]\nsmall, 1, 2\n", "line 2, row 'small'"),
+        ("name, mass [kg]\nsmall, 1\nsmall, 2\n", "line 3, column 'name': 'small'"),
+        ("name, mass [kg]\nsmall, 1\nlarge, two\n", "line 3, row 'large', column 'mass [kg]': 'two'"),
+        ("name, mass [kg]\nsmall, -1\n", "line 2, row 'small', column 'mass [kg]': counterweights[1].mass"),
+        ("name, mass [mm]\nsmall, 1\n", "line 2, row 'small', column 'mass [mm]'"),
+        ("name, weight [kg]\nsmall, 1\n", "column 'weight [kg]'"),
+        ("name, mass [kg], mass [kg]\nsmall, 1, 2\n", "two columns 'mass [kg]'"),
+    ],
+)
+def test_bad_lists_are_refused_in_one_line(read: Callable[..., Problem], rows: str, words: str) -> None:
+    with pytest.raises(InputError) as error:
+        methods.refuse(read(rows=rows))
+    (line,) = str(error.value).splitlines()
+    assert 'engine.toml: choices[1].file = "w.csv": has' in line
+    assert words in line
+    assert "; " in line
+
+
+@pytest.mark.parametrize(
+    ("text", "choice", "words"),
+    [
+        ("", CHOICE.replace("w.csv", "none.csv"), "cannot be read"),
+        ("", CHOICE + CHOICE, "one name"),
+        ("", CHOICE + CHOICE.replace('"weight"', '"other"'), "which 'mass [kg]' of 'weight' sets"),
+        ("", CHOICE + 'sets = { rating = "web.radius" }\n', "is no column of w.csv"),
+        ("", CHOICE.replace('parts = ["web"]\n', ""), "sets no number"),
+        ("", CHOICE.replace('"web"', '"wob"'), "wob"),
+        ('[robust]\nover = "worst case"\n[tolerances]\nresidual_unbalance = "50 g cm"\n', CHOICE, "not supported"),
+    ],
+)
+def test_what_is_not_supported_is_refused_in_one_line(
+    read: Callable[..., Problem], text: str, choice: str, words: str
+) -> None:
+    with pytest.raises(LaufruheError) as error:
+        methods.refuse(read(text, choice=choice))
+    assert words in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_open_and_changed_problems_are_refused(read: Callable[..., Problem], tmp_path: Path) -> None:
+    problem = read()
+    with pytest.raises(LaufruheError, match="code has changed"):
+        solve(problem.changed(limits=()))
+    text = (tmp_path / "engine.toml").read_text(encoding="utf-8")
+    (tmp_path / "engine.toml").write_text(text.replace('"1 kg"', '{ between = ["0 kg", "2 kg"] }'), encoding="utf-8")
+    with pytest.raises(InputError, match="is open in the file"):
+        methods.refuse(load(tmp_path / "engine.toml"))
+    (tmp_path / "engine.toml").write_text(text.replace("[1, 3, 4, 2]\n", '[1, 3, 4, 2]\nthrows = "open"\n'), "utf-8")
+    with pytest.raises(LaufruheError, match="throws are open"):
+        methods.refuse(load(tmp_path / "engine.toml"))
+
+
+def test_report_shows_rows_and_counts(read: Callable[..., Problem]) -> None:
+    result = solve(read("[parts_price]\ntotal = 5\n"))
+    chosen, ranked = SECTION.tables(result)
+    row = outcome_of(result).solved[0].rows[0]
+    assert list(chosen.rows[0][:2]) == ["weight", ["small", "middle", "large"][row]]
+    assert len(ranked.rows) == len(outcome_of(result).solved)
+    assert SECTION.record is not None
+    record = SECTION.record(result)
+    assert record["combinations"] == 3
+    assert record["rows"] == {"weight": ["small", "middle", "large"][row]}
