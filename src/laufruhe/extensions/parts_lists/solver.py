@@ -95,7 +95,7 @@ def _read(problem: Problem) -> tuple[Tables, tuple[PartsList, ...]]:
 def _loaded(problem: Problem, tables: Tables) -> Problem:
     assert problem.origin is not None
     drawing = load_tables(tables, problem.origin.path)
-    return replace(drawing, search=problem.search, tolerance=problem.tolerance, sharply=problem.sharply)
+    return replace(drawing, search=problem.search, tolerance=problem.tolerance)
 
 
 def solve_choices(problem: Problem, decide: methods.Decide, max_nodes: int = MAX_NODES) -> Result:
