@@ -63,9 +63,9 @@ def test_brute_force_finds_no_better_combination(seed: int, tmp_path: Path, monk
         return known[key]
 
     # subsets are bounded before they are small too
-    for size in (solver.MANY, 2):
-        monkeypatch.setattr(solver, "FEW", min(solver.FEW, size))
-        monkeypatch.setattr(solver, "MANY", size)
+    for size in (solver.LARGE, 2):
+        monkeypatch.setattr(solver, "SMALL", min(solver.SMALL, size))
+        monkeypatch.setattr(solver, "LARGE", size)
         for stop in (*STOPS, solver.MAX_NODES):
             with collected() as contradictions:
                 result = solver.solve_choices(problem, decide, stop)

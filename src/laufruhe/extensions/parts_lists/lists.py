@@ -179,8 +179,8 @@ def with_rows(tables: Tables, lists: Sequence[PartsList], subset: Subset) -> Tab
             for place in column.places:
                 edited = with_value_at(edited, place, column.over(rows))
     if "parts_price" in edited:
-        least = sum(min(parts.prices[row] for row in rows) for parts, rows in zip(lists, subset, strict=True))
-        edited["parts_price"] = {"total": least}
+        total = sum(min(parts.prices[row] for row in rows) for parts, rows in zip(lists, subset, strict=True))
+        edited["parts_price"] = {"total": total}
     return edited
 
 

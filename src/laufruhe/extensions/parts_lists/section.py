@@ -12,7 +12,7 @@ from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
 
-SHOWN = 8
+MAX_ROWS = 8
 """Number of combinations that the report shows."""
 
 
@@ -53,8 +53,8 @@ def _tables(result: Result) -> list[Table]:
     )
     head = [*(parts.sheet.name for parts in outcome.lists), "objective", "lower bound", "proof"]
     ranked = Table(
-        head, next_rows[:SHOWN], title="Best combinations", left=len(outcome.lists), note=counts,
-        file="combinations", omitted=max(len(next_rows) - SHOWN, 0),
+        head, next_rows[:MAX_ROWS], title="Best combinations", left=len(outcome.lists), note=counts,
+        file="combinations", omitted=max(len(next_rows) - MAX_ROWS, 0),
     )  # fmt: skip
     return [chosen, ranked]
 

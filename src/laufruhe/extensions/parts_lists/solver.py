@@ -48,7 +48,7 @@ from laufruhe.solvers.walk import check_by_walk
 
 MAX_NODES = 200_000
 """Largest number of subsets and combinations."""
-FEW, MANY = 4, 200
+SMALL, LARGE = 4, 200
 """Largest subset whose combinations are solved one by one: usually, and where only its bound is hard to compute."""
 BOXES = 64
 """Largest number of boxes for the bound of a subset."""
@@ -115,14 +115,14 @@ def solve_choices(problem: Problem, decide: methods.Decide, max_nodes: int = MAX
         # the walk refutes a bound
         best, bound = checked, 0.0
     assert best.objective is not None
-    value, own = best.objective.value, _bound_of(best)
+    value, best_bound = best.objective.value, _bound_of(best)
     is_exact = search.is_exact and bound > (1.0 - USELESS_GAP) * value
     certificate = make_certificate(
         value, bound, numerical_zero(problem, best.final.engine), problem.tolerance,
         ProofStrength.EXACT if is_exact else ProofStrength.RELAXED,
         best.certificate.kkt_residual if best.certificate is not None else 0.0, search.method,
         # the bound of the best combination is above its value by errors of sampling at most
-        max(own - value, 0.0),
+        max(best_bound - value, 0.0),
     )  # fmt: skip
     extras = tuple(replace(extra, outcome=search.outcome) for extra in problem.extras if isinstance(extra, Choices))
     return replace(
@@ -158,7 +158,7 @@ class _Search(BranchAndBound[Subset]):
         """Largest subset whose combinations are solved one by one without a bound of the subset."""
         numbers = [(self.groups[c], c.side) for parts in self.lists for c in parts.columns]
         is_easy = all(side or (moved and all(d.is_affine for d in moved)) for moved, side in numbers)
-        return FEW if is_easy or not all(d.is_affine for d in self.problem.decisions) else MANY
+        return SMALL if is_easy or not all(d.is_affine for d in self.problem.decisions) else LARGE
 
     def is_fathomed(self, node: OpenNode[Subset]) -> bool:
         """Return True if no combination of a subset is better than the best one."""
@@ -253,7 +253,7 @@ class _Search(BranchAndBound[Subset]):
         return _bound_of(result)
 
     def _check(self, bound: float, part: Subset) -> None:
-        """Report a lower bound of a subset that exceeds the value of a combination in it."""
+        # a combination in a subset has no value below its bound
         for known in self.solved.values():
             inside = all(row in rows for row, rows in zip(known.rows, part, strict=True))
             if inside and is_over(bound, known.value):
@@ -319,7 +319,7 @@ class _Search(BranchAndBound[Subset]):
 
 
 def _bound_of(result: Result) -> float:
-    """Return the lower bound of a result; its value if nothing is open, and the engine was evaluated alone."""
+    # the value itself if nothing is open, so that the engine was evaluated alone
     if result.status is Status.INFEASIBLE:
         return math.inf
     if result.certificate is not None:
@@ -337,7 +337,7 @@ def _width(values: Sequence[float], rows: Sequence[int]) -> float:
 
 
 def _wider(limit: Limit) -> Limit:
-    """Return a limit that is wider by the relative violation that a design may have."""
+    # by the relative violation that a design may have
     low, high = (FEASIBILITY_TOL * (abs(side) or 1.0) for side in (limit.minimum, limit.maximum))
     return replace(
         limit,
