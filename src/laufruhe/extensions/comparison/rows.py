@@ -11,8 +11,9 @@ from pydantic_core import PydanticCustomError
 
 from laufruhe.extensions.comparison.designs import Design
 from laufruhe.files.fields import Number, Open
-from laufruhe.files.nested import Place, number_at
+from laufruhe.files.nested import Place, at, number_at
 from laufruhe.files.problem_file import file_model
+from laufruhe.files.study_tables import path_text
 from laufruhe.files.toml_text import toml_value
 from laufruhe.present.measures import BEARINGS, FRICTION, MOUNTS, PINS, Places, titled_places
 from laufruhe.present.numbers import DASH, number, percent
@@ -143,7 +144,7 @@ def _by_objective(designs: Sequence[Design]) -> dict[Design, list[Design]]:
 
 
 def _inputs(designs: Sequence[Design]) -> Iterator[Row]:
-    files = [dict(_leaves(design.tables, (), ())) for design in designs]
+    files = [dict(_leaves(design.tables)) for design in designs]
     addresses = dict.fromkeys(address for file in files for address in file)
     tables = list(dict.fromkeys(_table(address) for address in addresses))
     for address in sorted(addresses, key=lambda address: tables.index(_table(address))):
@@ -157,23 +158,21 @@ def _table(address: str) -> str:
     return address.partition(".")[0]
 
 
-def _leaves(node: Any, place: Place, address: tuple[str, ...]) -> Iterator[tuple[str, tuple[str, Value]]]:
+def _leaves(tables: Mapping[str, Any], place: Place = ()) -> Iterator[tuple[str, tuple[str, Value]]]:
     """Yield (address, (unit, value)) of the numbers and texts of a file; addresses are those of studies."""
+    node = at(tables, place)
     field = number_at(file_model(), place) if place else None
-    if isinstance(node, Mapping) and (field is None or "between" not in node):
-        for key, entry in node.items():
-            if place or key not in TEXTS:
-                yield from _leaves(entry, (*place, key), (*address, key))
-    elif isinstance(node, list):
-        names = [entry.get("name") if isinstance(entry, Mapping) else None for entry in node]
-        for k, entry in enumerate(node):
-            name = names[k]
-            is_named = isinstance(name, str) and names.count(name) == 1
-            # the address has the name
-            content = {key: one for key, one in entry.items() if key != "name"} if is_named else entry
-            yield from _leaves(content, (*place, k), (*address, str(name) if is_named else str(k + 1)))
+    if isinstance(node, list):
+        for k in range(len(node)):
+            yield from _leaves(tables, (*place, k))
+    elif isinstance(node, Mapping) and (field is None or "between" not in node):
+        for key in node:
+            # the address of an entry of a list has its name
+            is_name = key == "name" and isinstance(place[-1], int) if place else key in TEXTS
+            if not is_name:
+                yield from _leaves(tables, (*place, key))
     else:
-        yield ".".join(address), _value(node, field)
+        yield path_text(tables, place), _value(node, field)
 
 
 def _value(node: Any, field: Number | None) -> tuple[str, Value]:
