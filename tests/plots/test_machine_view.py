@@ -10,7 +10,7 @@ import pytest
 
 from cli import scenes
 from laufruhe.files.reader import load
-from laufruhe.plots.machine_view import EngineView, reaches
+from laufruhe.plots.machine_view import EngineView, planes_of, reaches
 from laufruhe.plots.results import engine
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, half_disc
 from laufruhe.solvers import evaluate_only
@@ -83,3 +83,16 @@ def test_cylinders_are_numbered_where_they_do_not_cover_each_other(name: str, ah
     for axes, count in ((front, ahead), (side, beside)):
         numbers = [number for text in axes.texts for number in text.get_text().split(", ")]
         assert sorted(map(int, numbers)) == list(range(1, count + 1))
+
+
+def test_a_weight_stands_where_no_rod_runs() -> None:
+    """It is drawn in halves on the webs if its plane is that of a rod, and where the file has it if not."""
+    bores = {"tractor-single": 0.1, "tractor-six-bearings": 0.1}
+    for name, bore in bores.items():
+        view = EngineView.from_result(evaluate_only(load(PROBLEMS / f"{name}.toml")))
+        for rotor in view.engine.rotors:
+            planes = planes_of(view, rotor)
+            assert sum(x * thickness for x, thickness in planes) == pytest.approx(rotor.x * THICKNESS)
+            for x, thickness in planes:
+                gaps = [abs(x - part.x) - 0.5 * thickness - 0.08 * bore for part in view.engine.slider_cranks]
+                assert min(gaps) > 0.0

@@ -44,10 +44,10 @@ def size_of(path: Path) -> tuple[int, int]:
 @pytest.mark.parametrize(
     ("text", "wanted"),
     [
-        (scenes.TIGHT, ["engine", "polar", "cycle", "bars", "spectrum"]),
+        (scenes.TIGHT, ["engine", "polar", "ellipses", "cycle", "bars", "spectrum"]),
         (scenes.TWO_POINTS, ["engine", "polar", "cycle", "bars", "spectrum"]),
-        (scenes.PARTS, ["engine", "twins", "polar", "cycle", "bars", "spectrum"]),
-        (scenes.SHAKING_ONLY, ["engine", "cycle", "spectrum"]),
+        (scenes.PARTS, ["engine", "twins", "polar", "ellipses", "cycle", "bars", "spectrum"]),
+        (scenes.SHAKING_ONLY, ["engine", "ellipses", "cycle", "spectrum"]),
     ],
 )
 def test_a_result_fills_pictures(text: str, wanted: list[str]) -> None:
@@ -263,7 +263,7 @@ def renamed(result: Result, names: tuple[str, ...]) -> Result:
 def test_any_name_can_be_drawn(called: tuple[str, ...], tmp_path: Path) -> None:
     result = renamed(scenes.solved(scenes.TIGHT), called)
     assert len(result.final.engine.mounts) >= len(called)
-    assert len(draw(result, tmp_path)) == 5
+    assert len(draw(result, tmp_path)) == 6
 
 
 def test_long_lines_are_cut() -> None:

@@ -62,7 +62,7 @@ def figure(
 
 def _words(result: Result) -> Iterator[str]:
     problem, engine = result.problem, result.final.engine
-    yield from (problem.title, problem.source)
+    yield from (problem.title, problem.source, problem.objective_name)
     named: list[Any] = [*problem.points, *problem.limits, *problem.decisions]
     named += [*engine.cylinders, *engine.mounts, *engine.rotors, *engine.bearings]
     yield from (part.name for part in named)

@@ -96,6 +96,8 @@ def piston_at(axes: Axes, pose: Pose, bore: float, order: float, **look: Any) ->
 # width and height of both views, gap between them, least width of a view [inch]
 WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 2.2
 _OF_RODS = {"rod", "piston_pin", "bolts"}
+WEB, ROD = 0.24, 0.08
+"""Distance of a web from the middle of its throw, and half the width of a rod, over the bore."""
 ROOM = 1.1
 """Size of each view over the size of the drawn engine."""
 
@@ -249,7 +251,7 @@ def _side(axes: Axes, view: EngineView) -> None:
     for pose in poses:
         x, pin, crank, piston = pose.part.x, level(pose.pin), level(pose.crank), level(pose.piston)
         reach, sign = MM * 0.15 * bore, math.copysign(1.0, pin - crank)
-        for web in (x - 0.24 * bore, x + 0.24 * bore):
+        for web in (x - WEB * bore, x + WEB * bore):
             ends = (web - 0.06 * bore, web + 0.06 * bore)
             box(axes, ends, (crank - sign * 1.3 * reach, pin + sign * reach), 4.5, **_crank_look(view, pose))
         journal = (pin - 0.7 * reach, pin + 0.7 * reach)
@@ -260,7 +262,7 @@ def _side(axes: Axes, view: EngineView) -> None:
             axes.add_patch(Rectangle(corner, MM * body.width, max(levels) - min(levels), **look_of(body)))
             piston = 0.5 * (min(levels) + crank)
         if not pose.bodies:
-            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, **view.rod_look)
+            box(axes, (x - ROD * bore, x + ROD * bore), (pin, piston), 4.6, **view.rod_look)
             high = MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
             walls, ends = (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high)
             box(axes, walls, ends, 5.0, **view.piston_look(pose))
@@ -273,12 +275,25 @@ def _side(axes: Axes, view: EngineView) -> None:
         up, across = math.cos(along), radius * abs(math.sin(along))
         low, high = -radius if up < 0.0 else -across, radius if up > 0.0 else across
         middle = level(complex(rotor.shaft.z, rotor.shaft.y))
-        ends = (rotor.x - 0.5 * THICKNESS, rotor.x + 0.5 * THICKNESS)
-        box(axes, ends, (middle + MM * low, middle + MM * high), 5.5, **_weight_look(view, rotor))
+        for x, thickness in planes_of(view, rotor):
+            ends = (x - 0.5 * thickness, x + 0.5 * thickness)
+            box(axes, ends, (middle + MM * low, middle + MM * high), 5.5, **_weight_look(view, rotor))
     for mount in view.engine.mounts:
         x, y, z = mount.position
         axes.plot(MM * x, level(complex(z, y)), **_mount_look(mount.name in view.mounts))
     axes.set(xlabel="x [mm], the front at the left", ylabel="y [mm]" if view.is_flat else "z [mm]")
+
+
+def planes_of(view: EngineView, rotor: Rotor) -> list[tuple[float, float]]:
+    """Return place along the crank and thickness of the parts of a weight [m].
+
+    A weight in the plane of a rod stands in halves on both webs of the throw.
+    """
+    bore = bore_of(view.engine)
+    for part in view.engine.slider_cranks:
+        if rotor.shaft == part.shaft and abs(rotor.x - part.x) < ROD * bore + 0.5 * THICKNESS:
+            return [(part.x + side * WEB * bore, 0.5 * THICKNESS) for side in (-1.0, 1.0)]
+    return [(rotor.x, THICKNESS)]
 
 
 def _number_of(pose: Pose) -> str:

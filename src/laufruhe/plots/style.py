@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, cast
 
 import matplotlib as mpl
@@ -26,12 +27,13 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 from PIL import Image
 
-from laufruhe.errors import wrong_call
+from laufruhe.errors import counted, wrong_call
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import families
 from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, round_ticks, typeset, width_of, wrap_lines
 from laufruhe.present.measures import evaluations_with_loads, is_changed
 from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import FINAL, INITIAL, Result
 
 # Okabe and Ito: distinct for colour-blind readers, and by lightness in print
@@ -45,6 +47,8 @@ NARROWEST, WIDEST = 6.4, 10.2
 """Width of a page [inch]; the widest page keeps its size in a report."""
 EDGE = 0.3
 """Margin around the content of a page [inch]."""
+LONGEST_OBJECTIVE = 120
+"""Largest number of characters of the objective's name on a picture."""
 _BELOW_HEAD, _ABOVE_FOOT = 0.22, 0.2
 _TITLE, _ENGINE = 13.0, 10.0
 _LINE = 1.35 / 72.0
@@ -225,8 +229,16 @@ def finish_page(
     problem = result.problem
     described = f"Source: {problem.source}. " if problem.source else ""
     source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
-    heading(drawn, title, lines, legend, source, problem.title)
+    heading(drawn, title, f"{lines} {_objective(problem)}".rstrip(), legend, source, problem.title)
     return drawn.figure
+
+
+def _objective(problem: Problem) -> str:
+    # without it, a load that the design raises looks like a fault
+    if not problem.objective_name:
+        return ""
+    limits = f", under {counted(len(problem.limits), 'limit')}" if problem.limits else ""
+    return f"Objective: {shorten(problem.objective_name, LONGEST_OBJECTIVE, placeholder='…')}{limits}."
 
 
 def _legend_shape(labels: Sequence[str], room: float) -> tuple[int, int]:

@@ -32,6 +32,7 @@ _CAPTIONS = {
     "firings": "Firing orders of the best stars over one working cycle.",
     "twins": "Firings of a twin, and the parts of its first and second order that turn forward and backward.",
     "polar": "Force on each mount over one cycle: path of the force vector, or one component over the crank angle.",
+    "ellipses": "Mass ellipses: path of the free force and of the free couple of each order.",
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",

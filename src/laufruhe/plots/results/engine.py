@@ -6,7 +6,7 @@ import math
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.machine_view import EngineView, draw_views, legend_of, views
+from laufruhe.plots.machine_view import EngineView, draw_views, legend_of, planes_of, views
 from laufruhe.plots.style import finish_page, styled
 from laufruhe.present.measures import has_firing
 from laufruhe.present.poses import THICKNESS
@@ -25,6 +25,8 @@ def figure(result: Result) -> Figure:
     drawn = views(view)
     draw_views(drawn, view)
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
+    if any(len(planes_of(view, rotor)) > 1 for rotor in view.weights):
+        weights += " A weight in the plane of a rod is drawn in halves on both webs."
     cycle = view.engine.cycle.angle
     fires = [part.name for part in view.engine.cylinders if abs(math.remainder(part.firing_angle, cycle)) < 1e-9]
     firing = "firing " if has_firing(result) else ""
