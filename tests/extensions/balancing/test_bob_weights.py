@@ -7,7 +7,8 @@ import pytest
 from laufruhe.errors import InputError
 from laufruhe.extensions.balancing.bob_weights import SECTION, BobWeights, card
 from laufruhe.files.reader import load
-from laufruhe.solvers import evaluate_only
+from laufruhe.machine import Engine
+from laufruhe.solvers import evaluate_only, solve
 from problem_files import FOUR
 
 V8 = """
@@ -27,14 +28,16 @@ POINT = '[[operating_points]]\nspeed = "5000 rpm"\n'
 END = 'balance_factor = 0.5\nbig_end = "1 kg"\n'
 
 
-def weights_of(engine: str, table: str) -> BobWeights:
-    weights = load(f"{engine}\n{POINT}[bob_weights]\n{table}").engine.extra(BobWeights)
+def weights_of(engine: str, table: str) -> tuple[Engine, BobWeights]:
+    engine_of_file = load(f"{engine}\n{POINT}[bob_weights]\n{table}").engine
+    weights = engine_of_file.extra(BobWeights)
     assert weights is not None
-    return weights
+    return engine_of_file, weights
 
 
-def grams(weights: BobWeights) -> list[float]:
-    return [1e3 * weights.mass(k) for k in range(len(weights.throws))]
+def grams(pair: tuple[Engine, BobWeights]) -> list[float]:
+    engine, weights = pair
+    return [1e3 * weights.mass(engine, k) for k in range(len(weights.throws))]
 
 
 def test_ford_400() -> None:
@@ -54,7 +57,7 @@ def test_chevrolet_big_block() -> None:
         'balance_factor = 0.5\nrings = "69.5 g"\npiston = "583.9 g"\npin = "173.6 g"\nlocks = "4.8 g"\noil = "4 g"\n'
         'bearing_shells = "23.7 g"\nsmall_end = "162.4 g"\nbig_end = "229.8 g"\n',
     )
-    assert 1e3 * weights.shares(0)["big_end"][0] == pytest.approx(459.6)
+    assert 1e3 * weights[1].shares(weights[0], 0)["big_end"][0] == pytest.approx(459.6)
     assert grams(weights) == pytest.approx([1505.2] * 4)
 
 
@@ -77,20 +80,50 @@ def test_the_reciprocating_mass_of_the_engine_is_the_default() -> None:
 def test_parts_of_a_split_pin_have_bob_weights_of_their_own() -> None:
     engine = V8.replace("cylinders = 8", "cylinders = 6").replace("[0, 90, 270, 180]", "[0, 240, 120]")
     weights = weights_of(f"{engine}split_pin_angle = 30\n", 'balance_factor = 0.5\nbig_end = "500 g"\n')
-    assert sorted(weights.throws) == [(k,) for k in range(6)]
+    assert sorted(weights[1].throws) == [(k,) for k in range(6)]
     assert grams(weights) == pytest.approx([500.0 + 0.5 * 994.2] * 6)
 
 
 def test_the_card_has_a_column_for_each_pin_that_differs_and_says_what_the_engine_has() -> None:
     table = ('balance_factor = 0.5\nbig_end = "500 g"\nsmall_end = "200 g"\n'
              'piston = ["400 g", "400 g", "410 g", "400 g"]\n')  # fmt: skip
-    problem = load(f"{FOUR}\n{POINT}[bob_weights]\n{table}")
-    weights = problem.engine.extra(BobWeights)
-    assert weights is not None
-    sheet = card(problem.engine, weights)
+    sheet = card(*weights_of(FOUR, table))
     assert len(sheet.head) == 2 + 4
     assert [row[-2] for row in sheet.rows] == ["500.00", "205.00", "100.00", "805.00", "48300"]
-    assert "600.00 g, but reciprocating_mass of [engine] is 1250.0 g" in sheet.note
+    assert "600.00 g, but [engine] has 1250.0 g" in sheet.note
+
+
+ROD = '[engine.rod]\nmass = "700 g"\ncentre_of_gravity = "60 mm"\ninertia = "0.005 kg m^2"\n'
+
+
+@pytest.mark.parametrize(
+    ("engine", "listed", "difference"),
+    [
+        (V8, 'big_end = "0 g"', ""),
+        (f'{V8}rotating_mass = "800 g"', 'big_end = "400 g"', ""),
+        (f'{V8}rotating_mass = "800 g"', 'big_end = "401 g"',
+         "The rotating parts of cylinder 1, cylinder 5 have 802.00 g, but [engine] has 800.00 g"),
+        (f'{V8}[[engine.single_cylinders]]\ncylinders = [3]\nrotating_mass = "500 g"',
+         'big_end = ["0 g", "0 g", "450 g", "0 g", "0 g", "0 g", "50 g", "0 g"]', ""),
+        (f'{V8}[[engine.single_cylinders]]\ncylinders = [3]\nrotating_mass = "500 g"',
+         'big_end = ["0 g", "0 g", "500 g", "0 g", "0 g", "0 g", "9 g", "0 g"]',
+         "The rotating parts of cylinder 3, cylinder 7 have 509.00 g, but [engine] has 500.00 g"),
+        (f"{V8}{ROD}", 'big_end = "400 g"', ""),
+        (f"{V8}{ROD}", 'big_end = "300 g"\npiston = "994.2 g"\nsmall_end = "252 g"',
+         "The reciprocating parts have the mass of [engine]."),
+    ],
+)  # fmt: skip
+def test_the_card_compares_weighed_parts_with_the_mass_of_the_throw(engine: str, listed: str, difference: str) -> None:
+    note = card(*weights_of(engine, f"balance_factor = 0.5\n{listed}\n")).note
+    said = note.split("that at the crank radius.")[1].removesuffix(": loads and weights follow [engine].").strip()
+    assert said == difference
+
+
+def test_the_card_has_the_reciprocating_mass_of_the_final_design() -> None:
+    engine = V8.replace('"994.2 g"', '{ between = ["600 g", "900 g"], start = "900 g" }')
+    result = solve(load(f'{engine}\n{POINT}[bob_weights]\n{END}[objective]\nminimise = "rms shaking force"\n'))
+    (sheet,) = SECTION.tables(result)
+    assert ["reciprocating mass", "50 %", "600.0"] in [list(row) for row in sheet.rows]
 
 
 def test_results_have_the_card() -> None:

@@ -32,9 +32,11 @@ class BobWeights(Extra):
     oil
         Mass of the oil in a throw [kg].
     parts
-        Names of the parts, each with its mass at every cylinder [kg].
+        Names of the weighed parts, each with its mass at every cylinder [kg].
     throws
         Cylinders of each crank pin, as indices from zero.
+    throw_masses
+        Cylinders of each throw of the engine, and its rotating mass without rods [kg].
     """
 
     name: ClassVar[str] = "bob weights"
@@ -42,32 +44,39 @@ class BobWeights(Extra):
     oil: float
     parts: tuple[tuple[str, tuple[float, ...]], ...]
     throws: tuple[tuple[int, ...], ...]
+    throw_masses: tuple[tuple[tuple[int, ...], float], ...]
 
     def scaled(self, _: float, mass: float) -> Self:
         """Return the parts with their masses multiplied by a factor."""
         parts = tuple((name, tuple(mass * one for one in masses)) for name, masses in self.parts)
-        return replace(self, oil=mass * self.oil, parts=parts)
+        throws = tuple((cylinders, mass * one) for cylinders, one in self.throw_masses)
+        return replace(self, oil=mass * self.oil, parts=parts, throw_masses=throws)
 
-    def shares(self, throw: int) -> Mapping[str, tuple[float, float]]:
-        """Return the mass of each part on a throw [kg], and the share of it that the bob weight has (U1)."""
-        masses = {name: sum(masses[k] for k in self.throws[throw]) for name, masses in self.parts}
+    def shares(self, engine: Engine, pin: int) -> Mapping[str, tuple[float, float]]:
+        """Return the mass of each part on a crank pin [kg], and the share of it that the bob weight has (U1).
+
+        Without weighed pistons the engine has the reciprocating mass.
+        """
+        masses = {name: sum(masses[k] for k in self.throws[pin]) for name, masses in self.parts}
+        if not masses.keys() & set(RECIPROCATING):
+            masses[ENGINE_MASS] = sum(engine.slider_cranks[k].reciprocating_mass for k in self.throws[pin])
         shares = {name: (mass, 1.0 if name in ROTATING else self.factor) for name, mass in masses.items()}
         return {**shares, "oil": (self.oil, 1.0)}
 
-    def mass(self, throw: int) -> float:
-        """Return the bob weight of a throw [kg] (U1)."""
-        return sum(mass * part for mass, part in self.shares(throw).values())
+    def mass(self, engine: Engine, pin: int) -> float:
+        """Return the bob weight of a crank pin [kg] (U1)."""
+        return sum(mass * part for mass, part in self.shares(engine, pin).values())
 
 
 def card(engine: Engine, weights: BobWeights) -> Table:
     """Return the card of bob weights, with a column for every crank pin, or one for all if they are equal."""
-    throws = [weights.shares(k) for k in range(len(weights.throws))]
+    throws = [weights.shares(engine, k) for k in range(len(weights.throws))]
     radii = [engine.slider_cranks[on_pin[0]].crank_radius for on_pin in weights.throws]
     names = [", ".join(engine.slider_cranks[i].name for i in on_pin) for on_pin in weights.throws]
     if all(pair == (throws[0], radii[0]) for pair in zip(throws, radii, strict=True)):
         names, throws, radii = [f"each of {counted(len(throws), 'crank pin')}"], throws[:1], radii[:1]
     columns = {name: [shares[name] for shares in throws] for name in throws[0]}
-    totals = [weights.mass(k) for k in range(len(throws))]
+    totals = [weights.mass(engine, k) for k in range(len(throws))]
     (unit, grams), (unbalance, size) = readable("kg", "g"), readable("kg m", "g mm")
     largest = grams * max(totals)
     rows = [
@@ -81,28 +90,38 @@ def card(engine: Engine, weights: BobWeights) -> Table:
     )
     note = (
         "On a crank pin, all rods of the pin counted: rotating masses and oil in full, reciprocating masses with "
-        f"the balance factor. The unbalance is that at the crank radius. {_difference(engine, weights)}"
+        f"the balance factor. The unbalance is that at the crank radius.{_difference(engine, weights)}"
     )
     return Table((f"part [{unit}]", "share", *names), rows, title="Bob weights", note=note, file=CARD)
 
 
 def _difference(engine: Engine, weights: BobWeights) -> str:
-    # the engine of the file may have other masses; its rotating mass includes that of crank pins
-    pairs = []
-    for k, part in enumerate(engine.slider_cranks):
-        for kind, names in (("reciprocating", RECIPROCATING), ("rotating", ROTATING)):
-            listed = sum(masses[k] for name, masses in weights.parts if name in names)
-            pairs.append((kind, part.name, listed, getattr(part, f"{kind}_mass")))
+    """Return a sentence on weighed parts whose mass is not that of the engine; empty if it has none of its own.
+
+    The rotating mass of the engine includes that of the crank pin, so the weighed parts may have less.
+    """
+    cranks = engine.slider_cranks
+    groups = [("reciprocating", RECIPROCATING, (k,), part.reciprocating_mass) for k, part in enumerate(cranks)]
+    groups += [
+        ("rotating", ROTATING, on_throw, mass + sum(cranks[k].rotating_mass for k in on_throw))
+        for on_throw, mass in weights.throw_masses
+    ]
+    rows = []
+    for kind, names, cylinders, mass in groups:
+        weighed = [sum(masses[k] for k in cylinders) for name, masses in weights.parts if name in names]
+        if weighed:
+            rows.append((kind, ", ".join(cranks[k].name for k in cylinders), sum(weighed), mass))
     wrong = [
-        (kind, name, listed, mass) for kind, name, listed, mass in pairs
-        if listed - mass > 1e-4 * listed or (kind == "reciprocating" and mass - listed > 1e-4 * mass)
+        row for row in rows
+        if row[2] - row[3] > 1e-4 * row[2] or (row[0] == "reciprocating" and row[3] - row[2] > 1e-4 * row[3])
     ]  # fmt: skip
     if not wrong:
-        return "The reciprocating parts have the mass of [engine]."
+        is_weighed = any(kind == "reciprocating" for kind, *_ in rows)
+        return " The reciprocating parts have the mass of [engine]." * is_weighed
     unit, grams = readable("kg", "g")
-    kind, name, listed, mass = max(wrong, key=lambda pair: abs(pair[2] - pair[3]))
+    kind, where, total, mass = max(wrong, key=lambda row: abs(row[2] - row[3]))
     return (
-        f"The {kind} parts of {name} have {number(grams * listed, 5)} {unit}, but {kind}_mass of [engine] is "
+        f" The {kind} parts of {where} have {number(grams * total, 5)} {unit}, but [engine] has "
         f"{number(grams * mass, 5)} {unit}: loads and weights follow [engine]."
     )
 
@@ -112,8 +131,8 @@ def record(engine: Engine, weights: BobWeights) -> Mapping[str, Any]:
     return {
         "balance_factor": weights.factor,
         "throws": [
-            {"cylinders": [engine.slider_cranks[i].name for i in on_pin], "bob_weight": weights.mass(k),
-             "parts": {name: {"mass": mass, "share": part} for name, (mass, part) in weights.shares(k).items()}}
+            {"cylinders": [engine.slider_cranks[i].name for i in on_pin], "bob_weight": weights.mass(engine, k),
+             "parts": {name: {"mass": mass, "share": part} for name, (mass, part) in weights.shares(engine, k).items()}}
             for k, on_pin in enumerate(weights.throws)
         ],
     }  # fmt: skip

@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 
 from laufruhe import units
 from laufruhe.errors import InputError, refused
-from laufruhe.extensions.balancing.bob_weights import ENGINE_MASS, RECIPROCATING, BobWeights
+from laufruhe.extensions.balancing.bob_weights import RECIPROCATING, BobWeights
 from laufruhe.extensions.balancing.physics import Dial, Drilling, Hole, Plane, plane_shares
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, require_distinct, require_one_of
@@ -223,14 +223,15 @@ def _read_bob_weights(table: BobWeightsTable, problem: Problem, context: Extensi
             rule = f"is missing, and {listed[0]} is given"
             raise Refused(f"bob_weights.{name}", None, rule, "add it, or leave all reciprocating parts out")
     parts = [(name, _masses_of(table, name, len(cranks))) for name in ("big_end", "bearing_shells", *listed)]
-    if not listed:
-        parts.append((ENGINE_MASS, tuple(part.reciprocating_mass for part in cranks)))
     pins = dict[tuple[int, object], list[int]]()
     for k, throw in enumerate(context.throws):
         for i in throw.cylinders:
             # the parts of a split pin have bob weights of their own
             pins.setdefault((k, direction(cranks[i].throw)), []).append(i)
-    weights = BobWeights(table.balance_factor, table.oil, tuple(parts), tuple(map(tuple, pins.values())))
+    masses = tuple(
+        (throw.cylinders, abs(throw.unbalance) / cranks[throw.cylinders[0]].crank_radius) for throw in context.throws
+    )
+    weights = BobWeights(table.balance_factor, table.oil, tuple(parts), tuple(map(tuple, pins.values())), masses)
     return replace(problem, engine=problem.engine.with_extra(weights))
 
 
