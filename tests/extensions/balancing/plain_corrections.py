@@ -20,11 +20,12 @@ Tables = dict[str, Any]
 
 @dataclass(frozen=True)
 class PlainHole:
-    """Hole at a place: its angle on the crank [deg], diameter and depth [mm], and change of the unbalance [g mm]."""
+    """Hole at a place: its angle on the crank [deg], diameter, depth and radius of its end [mm], change [g mm]."""
 
     angle: float
     diameter: float
     depth: float
+    end: float
     filled: bool
     change: complex
 
@@ -51,20 +52,37 @@ def change(job: Tables, radius: float, diameter: float, depth: float, fill: floa
 
 def edge_distance(angle: float, radius: float, edge: float) -> float:
     """Distance of a place from the ray of an edge."""
-    place, ray = cmath.rect(radius, math.radians(angle)), cmath.rect(1.0, math.radians(edge))
-    along = max((place * ray.conjugate()).real, 0.0)
-    return abs(place - along * ray)
+    place, far = cmath.rect(radius, math.radians(angle)), cmath.rect(1e6, math.radians(edge))
+    return point_distance(place, 0.0, far)
+
+
+def point_distance(point: complex, start: complex, end: complex) -> float:
+    """Distance of a point from the line between two points."""
+    way = end - start
+    share = 0.0 if way == 0.0 else ((point - start) * way.conjugate()).real / abs(way) ** 2
+    return abs(point - start - min(max(share, 0.0), 1.0) * way)
+
+
+def axis_distance(one: PlainHole, other: PlainHole, radius: float) -> float:
+    """Distance of the axes of two holes in the plane; they do not cross, so it is that of an end of one of them."""
+    axes = [[cmath.rect(r, math.radians(hole.angle)) for r in (radius, hole.end)] for hole in (one, other)]
+    return min(point_distance(end, *axis) for axis, points in (axes, axes[::-1]) for end in points)
 
 
 def is_inside(angle: float, sector: list[float]) -> bool:
     return (angle - sector[0]) % 360.0 <= (sector[1] - sector[0]) % 360.0
 
 
+def end_depth(job: Tables, diameter: float, depth: float) -> float:
+    """Depth of the centre of a ball of the hole's diameter that covers its end, with the drill's point."""
+    slender = diameter / 2.0 / math.tan(math.radians(job.get("point_angle", 180) / 2.0)) - diameter / 2.0
+    return depth + max(slender, 0.0)
+
+
 def holes_of(job: Tables, plane: Tables) -> Iterator[list[PlainHole]]:
     """Yield all holes of each place."""
     radius, wall = number(plane["radius"]), number(job.get("wall", 0.0))
-    depth_limit = number(job["max_depth"])
-    narrow = radius - depth_limit if job["direction"] == "radial" else radius
+    depth_limit = number(plane.get("max_depth", job["max_depth"]))
     step = number(job["depth_step"])
     depths = [k * step for k in range(1, 200) if number(job["min_depth"]) <= k * step <= depth_limit]
     kinds = [(number(d), 0.0) for d in job["drills"]]
@@ -73,20 +91,18 @@ def holes_of(job: Tables, plane: Tables) -> Iterator[list[PlainHole]]:
     angles = plane.get("angles") or [plane["first_place"] + 360.0 * k / plane["places"] for k in range(plane["places"])]
     for angle in angles:
         there = []
-        for diameter, fill in kinds:
+        for (diameter, fill), depth in itertools.product(kinds, depths):
+            end = radius - end_depth(job, diameter, depth) if job["direction"] == "radial" else radius
             room = diameter / 2.0 + wall - 1e-9
 
-            def clear(sector: list[float], angle: float = angle, room: float = room) -> bool:
-                return all(edge_distance(angle, narrow, edge) >= room for edge in sector)
+            def clear(sector: list[float], angle: float = angle, end: float = end, room: float = room) -> bool:
+                return all(edge_distance(angle, end, edge) >= room for edge in sector)
 
             fits = all(not is_inside(angle, sector) and clear(sector) for sector in plane.get("solid", []))
             allowed = plane.get("allowed", [])
             if fits and (not allowed or any(is_inside(angle, s) and clear(s) for s in allowed)):
-                there += [
-                    PlainHole(angle, diameter, depth, fill > 0.0,
-                              cmath.rect(change(job, radius, diameter, depth, fill), math.radians(angle)))
-                    for depth in depths
-                ]  # fmt: skip
+                size = cmath.rect(change(job, radius, diameter, depth, fill), math.radians(angle))
+                there.append(PlainHole(angle, diameter, depth, end, fill > 0.0, size))
         if there:
             yield there
 
@@ -101,20 +117,19 @@ def residuals(job: Tables, plane: Tables, max_holes: int) -> tuple[complex, list
     sense = 1.0 if job["machine_counts"] == "with rotation" else -1.0
     initial = cmath.rect(size, math.radians(job["zero_mark"] + sense * measured["angle"]))
     radius, wall = number(plane["radius"]), number(job.get("wall", 0.0))
-    narrow = radius - number(job["max_depth"]) if job["direction"] == "radial" else radius
     places = list(holes_of(job, plane))
     least = []
     for count in range(min(max_holes, len(places)) + 1):
         best = math.inf
         for chosen in itertools.combinations(places, count):
-            near = []
-            for i, j in itertools.combinations(range(count), 2):
-                gap = abs(cmath.rect(narrow, math.radians(chosen[i][0].angle))
-                          - cmath.rect(narrow, math.radians(chosen[j][0].angle)))  # fmt: skip
-                near.append((i, j, gap - wall + 1e-9))
+            pairs = list(itertools.combinations(range(count), 2))
             for holes in itertools.product(*chosen):
                 size = abs(initial + sum(hole.change for hole in holes))
-                if size < best and all((holes[i].diameter + holes[j].diameter) / 2.0 <= room for i, j, room in near):
+                if size < best and all(
+                    (holes[i].diameter + holes[j].diameter) / 2.0 + wall
+                    <= axis_distance(holes[i], holes[j], radius) + 1e-9
+                    for i, j in pairs
+                ):
                     best = size
         least.append(best)
     return initial, least
@@ -164,6 +179,14 @@ def random_file(seed: int, max_holes: int = 3) -> Tables:
         )  # fmt: skip
         plane["permitted_unbalance"] = f"{draw.choice([5, 20, 60, 150])} g mm"
         job["planes"].append(plane)
+    for plane in job["planes"] if radial and draw.random() < 0.6 else []:
+        # narrow places, where the depth of each hole decides how near the next one may be
+        for key in ("places", "allowed"):
+            plane.pop(key, None)
+        first, step = plane.pop("first_place", 0.0), draw.uniform(14, 28)
+        plane |= {"angles": [round(first + k * step, 2) for k in range(5)], "max_depth": f"{draw.randint(10, 22)} mm"}
+        if "solid" in plane:
+            plane["solid"] = [[round(first + k * step, 2) for k in (2.2, 2.6)]]
     return {"title": f"random correction {seed}", "correction": job}
 
 

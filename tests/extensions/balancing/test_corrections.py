@@ -105,6 +105,39 @@ def test_more_allowed_places_never_worsen(seed: int) -> None:
         assert more.is_met or not fewer.is_met
 
 
+RADIAL = [seed for seed in range(40) if any("max_depth" in p for p in random_file(seed)["correction"]["planes"])][:6]
+
+
+@pytest.mark.parametrize("seed", RADIAL)
+def test_a_larger_max_depth_never_leaves_more(seed: int) -> None:
+    tables = random_file(seed)
+    deeper = copy.deepcopy(tables)
+    for plane in deeper["correction"]["planes"]:
+        plane["max_depth"] = f"{float(plane['max_depth'].split()[0]) + 5.0} mm"
+    for low, high, gap in zip(answer(tables).planes, answer(deeper).planes, read(tables).gaps, strict=True):
+        for count, other in zip(low.counts, high.counts, strict=False):
+            assert other.value <= count.value + gap
+            assert other.bound <= count.value
+
+
+def test_each_hole_keeps_its_wall_along_its_own_depth() -> None:
+    """A crank cheek of 62 mm: 8 mm wide and 20 mm deep at 40 deg, beside a pin of 30 deg, leaves 3.70 g cm of 42."""
+    tables: Tables = {
+        "title": "Cheek",
+        "correction": {
+            "density": "7850 kg/m^3", "drills": ["8 mm", "10 mm", "12 mm", "14 mm", "16 mm"], "direction": "radial",
+            "point_angle": 118, "depth_step": "1 mm", "min_depth": "3 mm", "max_depth": "25 mm", "wall": "3 mm",
+            "max_holes": 1, "permitted_unbalance": "120.3 g mm",
+            "planes": [
+                {"name": name, "measured": {"unbalance": "42 g cm", "angle": 35}, "radius": "62 mm", "places": 36,
+                 "solid": [[-30, 30]]}
+                for name in ("front", "rear")
+            ],
+        },
+    }  # fmt: skip
+    assert 1e5 * abs(answer(tables).planes[0].residual) < 3.70
+
+
 def test_zero_mark_and_sense_change_readings_only() -> None:
     tables = random_file(5)
     dials = [Dial(math.radians(zero), sense) for zero, sense in ((0.0, 1.0), (40.0, 1.0), (40.0, -1.0), (-75.0, -1.0))]

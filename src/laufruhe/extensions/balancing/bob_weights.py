@@ -101,11 +101,11 @@ def _difference(engine: Engine, weights: BobWeights) -> str:
     The rotating mass of the engine includes that of the crank pin, so the weighed parts may have less.
     """
     cranks = engine.slider_cranks
-    groups = [("reciprocating", RECIPROCATING, (k,), part.reciprocating_mass) for k, part in enumerate(cranks)]
-    groups += [
-        ("rotating", ROTATING, on_throw, mass + sum(cranks[k].rotating_mass for k in on_throw))
-        for on_throw, mass in weights.throw_masses
-    ]
+    groups: list[tuple[str, tuple[str, ...], tuple[int, ...], float]] = [
+        *(("reciprocating", RECIPROCATING, (k,), part.reciprocating_mass) for k, part in enumerate(cranks)),
+        *(("rotating", ROTATING, on_throw, mass + sum(cranks[k].rotating_mass for k in on_throw))
+          for on_throw, mass in weights.throw_masses),
+    ]  # fmt: skip
     rows = []
     for kind, names, cylinders, mass in groups:
         weighed = [sum(masses[k] for k in cylinders) for name, masses in weights.parts if name in names]

@@ -330,7 +330,6 @@ def _plane(table: CorrectionTable, k: int, permitted: float | None, drilling: Dr
     if drilling.is_radial and deepest >= row.radius:
         text = units.quantity_text(depth, "m")
         raise Refused(f"{where}.max_depth", text, "reaches the axis with the drill's point", "make it smaller")
-    narrowest = row.radius - depth if drilling.is_radial else row.radius
     choices = _holes(table, depth, row.radius, drilling)
     if not choices:
         text = units.quantity_text(depth, "m")
@@ -338,7 +337,7 @@ def _plane(table: CorrectionTable, k: int, permitted: float | None, drilling: Dr
         raise Refused(f"{where}.max_depth", text, rule, "make it larger, or depth_step smaller")
     sectors = _sectors(row.allowed), _sectors(row.solid)
     holes = [
-        tuple(hole for hole in choices if _fits(angle, narrowest, 0.5 * hole.diameter + table.wall, *sectors))
+        tuple(hole for hole in choices if _fits(angle, hole.end, 0.5 * hole.diameter + table.wall, *sectors))
         for angle in angles
     ]
     usable = [(angle, there) for angle, there in zip(angles, holes, strict=True) if there]
@@ -348,7 +347,7 @@ def _plane(table: CorrectionTable, k: int, permitted: float | None, drilling: Dr
     initial = cmath.rect(size, dial.on_crank(row.measured.angle))
     return Plane(
         row.name, row.radius, initial, tuple(angle for angle, _ in usable), tuple(there for _, there in usable),
-        permitted, narrowest, table.wall, sectors[1],
+        permitted, table.wall, sectors[1],
     )  # fmt: skip
 
 
@@ -366,7 +365,7 @@ def _holes(table: CorrectionTable, max_depth: float, radius: float, drilling: Dr
     kinds = [(diameter, False) for diameter in table.drills]
     kinds += [] if table.slugs is None else [(diameter, True) for diameter in table.slugs.diameters]
     return tuple(
-        Hole(diameter, depth, filled, drilling.unbalance(diameter, depth, radius, filled))
+        drilling.hole(diameter, depth, radius, filled)
         for diameter, filled in kinds
         for depth in (table.depth_step * step for step in range(first, last + 1))
     )

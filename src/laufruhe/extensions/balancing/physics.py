@@ -41,6 +41,13 @@ class Drilling:
         """Return the height of the cone that the drill's point leaves [m] (U2)."""
         return 0.5 * diameter / math.tan(0.5 * self.point_angle)
 
+    def hole(self, diameter: float, depth: float, radius: float, filled: bool = False) -> Hole:
+        """Return a hole; `radius` is that of the axis of an axial hole, or of the surface at a radial one [m]."""
+        # a round end covers a drill's point that is not longer than the radius of the hole
+        end = depth + max(self.point_height(diameter) - 0.5 * diameter, 0.0)
+        change = self.unbalance(diameter, depth, radius, filled)
+        return Hole(diameter, depth, filled, change, radius - end * self.is_radial)
+
     def mass(self, diameter: float, depth: float, filled: bool = False) -> float:
         """Return the change of mass by a hole, or by a hole with a slug [kg] (U2)."""
         return sum(mass for mass, _ in self._bodies(diameter, depth, filled))
@@ -79,12 +86,15 @@ class Hole:
         True with a slug.
     change
         Change of the unbalance [kg m], negative for a hole without slug.
+    end
+        Radius on the crank at which its axis ends [m], with a round end of its diameter beyond (U5).
     """
 
     diameter: float
     depth: float
     filled: bool
     change: float
+    end: float
 
 
 Design: TypeAlias = tuple[tuple[int, int], ...]
@@ -109,8 +119,6 @@ class Plane:
         Holes that each place may get.
     permitted
         Permitted residual unbalance [kg m]; None if only the least residual is of interest.
-    narrowest
-        Radius at which neighbouring holes are closest [m].
     wall
         Least thickness of material between two holes [m].
     solid
@@ -123,7 +131,6 @@ class Plane:
     angles: tuple[float, ...]
     holes: tuple[tuple[Hole, ...], ...]
     permitted: float | None = None
-    narrowest: float = math.inf
     wall: float = 0.0
     solid: tuple[tuple[float, float], ...] = ()
 
@@ -135,9 +142,10 @@ class Plane:
             for angle, holes in zip(self.angles, self.holes, strict=True)
         )
 
-    def diameters(self, place: int) -> Array:
-        """Return the diameters of the holes of a place [m]."""
-        return np.array([hole.diameter for hole in self.holes[place]])
+    @cached_property
+    def sizes(self) -> tuple[tuple[Array, Array], ...]:
+        """Diameters of the holes of each place, and radii at which their axes end [m]."""
+        return tuple((np.array([h.diameter for h in there]), np.array([h.end for h in there])) for there in self.holes)
 
     def residual(self, design: Design) -> complex:
         """Return the unbalance after correction [kg m] (U4)."""
@@ -145,9 +153,13 @@ class Plane:
 
     def clashes(self, place: int, other: int) -> Mask:
         """Return which holes of two places leave too little material between them, shape (holes, holes) (U5)."""
-        chord = 2.0 * self.narrowest * abs(math.sin(0.5 * (self.angles[place] - self.angles[other])))
-        sums = self.diameters(place)[:, None] + self.diameters(other)
-        clash: Mask = 0.5 * sums + self.wall > chord * (1.0 + 1e-12)
+        (diameters, ends), (others, other_ends) = self.sizes[place], self.sizes[other]
+        bend = 4.0 * math.sin(0.5 * (self.angles[place] - self.angles[other])) ** 2
+        # the shallower hole is nearest at its end, to the end or to the side of the deeper one
+        deep, shallow = np.minimum(ends[:, None], other_ends), np.maximum(ends[:, None], other_ends)
+        along = np.maximum(deep, shallow * (1.0 - 0.5 * bend))
+        square = (along - shallow) ** 2 + bend * along * shallow
+        clash: Mask = (0.5 * (diameters[:, None] + others) + self.wall) ** 2 > square * (1.0 + 2e-12)
         return clash
 
 

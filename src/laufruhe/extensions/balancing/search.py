@@ -6,14 +6,14 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 from typing import TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from laufruhe.extensions.balancing.physics import Design, Plane
-from laufruhe.numerics.arrays import Array, ComplexArray, Indices, Mask
+from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.numerics.witness import check_bound, collected
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoundedParts, BranchAndBound, FathomedPart, OpenNode
 from laufruhe.prove.witness import Witness
@@ -221,22 +221,31 @@ class PlaceSets(BranchAndBound[Places | None]):
 
     def _least_of(self, places: Places) -> float:
         """Enumerate the holes of a set of places by halves, and return the least residual below the cutoff (U9)."""
-        plane, half, level = self._plane, len(places) // 2, self.cutoff
+        plane, half, level = self._plane, len(places) // 2, max(self.cutoff, 0.0)
         left, right = _choices(plane, places[:half]), _choices(plane, places[half:])
-        sums = [_sums(plane, ends, rows) for ends, rows in ((places[:half], left), (places[half:], right))]
-        for rows, others in _compatible(plane, places, left, right):
-            if not rows.any() or not others.any():
-                continue
-            tree = cKDTree(_points(sums[1][others]))
-            targets = -(plane.initial + sums[0][rows])
-            answer = tree.query(_points(targets), distance_upper_bound=max(level, 0.0))
-            distances, nearest = np.asarray(answer[0], dtype=float), np.asarray(answer[1], dtype=np.intp)
-            k = int(np.argmin(distances))
-            if distances[k] < level:
-                level = float(distances[k])
-                chosen = (*left[rows][k].tolist(), *right[others][nearest[k]].tolist())
+        pairs = [
+            (i, j, clash) for i, j in np.ndindex(half, len(places) - half)
+            if (clash := plane.clashes(places[i], places[half + j])).any()
+        ]  # fmt: skip
+        for i, j, clash in pairs:
+            left, right = left[~clash.min(axis=1)[left[:, i]]], right[~clash.min(axis=0)[right[:, j]]]
+        rows, count = np.arange(len(left) * bool(len(right))), 1
+        tree = cKDTree(_points(_sums(plane, places[half:], right)))
+        targets = _points(-(plane.initial + _sums(plane, places[:half], left)))
+        while rows.size:
+            answer = tree.query(targets[rows], list(range(1, count + 1)), distance_upper_bound=level)
+            distances, nearest = np.array(answer[0]), np.minimum(answer[1], len(right) - 1)
+            furthest = distances[:, -1].copy()
+            for i, j, clash in pairs:
+                distances[clash[left[rows, i, None], right[nearest, j]]] = math.inf
+            row, k = np.unravel_index(distances.argmin(), distances.shape)
+            if distances[row, k] < level:
+                level = float(distances[row, k])
+                chosen = (*left[rows[row]].tolist(), *right[nearest[row, k]].tolist())
                 self.design = tuple(zip(places, chosen, strict=True))
                 self.value = abs(plane.residual(self.design))
+            # a row whose neighbours are nearer than the level, and clash, needs more of them
+            rows, count = rows[furthest < level], 8 * count
         return level - self.rounding
 
 
@@ -274,24 +283,3 @@ def _sums(plane: Plane, places: Places, rows: Indices) -> ComplexArray:
 
 def _points(values: ComplexArray) -> Array:
     return np.column_stack([values.real, values.imag])
-
-
-def _compatible(plane: Plane, places: Places, left: Indices, right: Indices) -> Iterator[tuple[Mask, Mask]]:
-    """Yield classes of rows of the left half with the rows of the right half that clash with none of them."""
-    half = left.shape[1]
-    pairs = [
-        (i, j, clash)
-        for i, j in product(range(half), range(right.shape[1]))
-        if (clash := plane.clashes(places[i], places[half + j])).any()
-    ]
-    if not pairs:
-        yield np.ones(len(left), dtype=bool), np.ones(len(right), dtype=bool)
-        return
-    # clashes depend on diameters alone
-    marks = np.column_stack([plane.diameters(places[i])[left[:, i]] for i in sorted({i for i, _, _ in pairs})])
-    _, examples, classes = np.unique(marks, axis=0, return_index=True, return_inverse=True)
-    for k, example in enumerate(left[examples]):
-        allowed = np.ones(len(right), dtype=bool)
-        for i, j, clash in pairs:
-            allowed &= ~clash[example[i]][right[:, j]]
-        yield classes.ravel() == k, allowed
