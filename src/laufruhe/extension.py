@@ -97,7 +97,14 @@ _OF_SIZES = (
 )  # fmt: skip
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
-    "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
+    "study_kinds": {
+        "economics": "economics",
+        "random designs": "random_studies",
+        "random scenes": "random_studies",
+        "replication": "replication",
+        "speed map": "speed_maps",
+        "tolerance": "robust",
+    },
     "commands": {
         "page": "served_page",
         "balance": "balancing",

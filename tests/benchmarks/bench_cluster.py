@@ -24,13 +24,13 @@ from pathlib import Path
 import numpy as np
 from pages import PAGES, publish
 
+from laufruhe.extensions.random_studies.sampled import MAX_TABLED
 from laufruhe.numerics import cluster as own_cluster
 from laufruhe.numerics.cluster import cluster as on_cluster
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import SERIAL, unordered_map
 from laufruhe.plots.picture import save_picture
 from laufruhe.present import picture as p
-from laufruhe.studies.sampled import MAX_TABLED
 from studies import clusters
 
 OUT = PAGES / "cluster.md"
@@ -40,7 +40,7 @@ SMALL = {"draws": 4000, "chunk": 500, "scenes": 40, "few": 2, "points": 3}
 SHARED = {"draws": 100_000, "chunk": 10_000, "scenes": 160, "few": 10, "points": 2}
 ROOM = 40 << 10
 FULL = """import errno, os
-from laufruhe.studies.stores import Draws
+from laufruhe.extensions.random_studies.draws import Draws
 keep, taken = Draws.keep, []
 def full(store, mark, seconds, record):
     taken.append(record["values"].nbytes)

@@ -54,15 +54,6 @@ class SweepTable(Table):
         return (self.points or 0) if self.values is None else len(self.values)
 
 
-class DrawnTable(Table):
-    """Quantity of the problem that is drawn at random, evenly between two ends."""
-
-    quantity: str = f.required("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
-    first: int | float | str = Field(alias="from")
-    last: int | float | str = Field(alias="to")
-    spacing: Literal["linear", "log"] = "linear"
-
-
 class CaseTable(Table):
     """Case of a study: a problem file with changes."""
 
@@ -238,10 +229,10 @@ def axis_of(sweep: SweepTable) -> SweepAxis:
 
 @dataclass(frozen=True)
 class Span:
-    """Range of a quantity, a path in the problem file, that is drawn at random.
+    """Range of a quantity, a path in the problem file, that is swept or drawn, linearly or by its logarithm.
 
-    The ends are in the unit of the study file, which is "1" for plain numbers. The quantity or its logarithm is
-    uniform, and `is_text` is True if a problem file gives it as text with its unit.
+    The ends are in the unit of the study file, which is "1" for plain numbers. `is_text` is True if a problem file
+    gives the quantity as text with its unit.
     """
 
     quantity: str
@@ -251,24 +242,9 @@ class Span:
     is_log: bool
     is_text: bool
 
-    def numbers(self, shares: Any) -> Any:
-        """Return numbers in the range at fractions of it from 0 to 1, an array of any shape."""
-        low, high = self.low, self.high
-        return low * (high / low) ** shares if self.is_log else low + (high - low) * shares
 
-    def value(self, number: float) -> Value:
-        """Return a number as it is written in a problem file."""
-        if not self.is_text:
-            return float(number)
-        return f"{float(number)!r}" if self.unit == "1" else f"{float(number)!r} {self.unit}"
-
-
-def span_of(drawn: DrawnTable) -> Span:
-    """Return the range from which a quantity is drawn; raise `Refused` if its ends do not fit."""
-    return _span(drawn.quantity, drawn.first, drawn.last, drawn.spacing)
-
-
-def _span(quantity: str, first: Value, last: Value, spacing: str | None) -> Span:
+def span_of(quantity: str, first: Value, last: Value, spacing: str | None) -> Span:
+    """Return the range of a quantity between two ends; raise `Refused` if these do not fit."""
     for key, end in (("from", first), ("to", last)):
         # each end separately, so that complaints name the wrong one
         _measured(quantity, (end,), key)
@@ -300,7 +276,7 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
         raise Refused("points", sweep.points, "makes no sweep", "give two points or more")
     if sweep.points > MAX_POINTS:
         raise Refused("points", sweep.points, f"is more than {MAX_POINTS}", "give fewer")
-    span = _span(sweep.quantity, sweep.first, sweep.last, sweep.spacing)
+    span = span_of(sweep.quantity, sweep.first, sweep.last, sweep.spacing)
     with np.errstate(all="ignore"):
         numbers = (np.geomspace if span.is_log else np.linspace)(span.low, span.high, sweep.points)
     if not np.isfinite(numbers).all():

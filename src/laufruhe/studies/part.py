@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
 
 from pydantic import Field
 
@@ -20,16 +21,20 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Record: TypeAlias = dict[str, Any]
-VALUES, COLUMNS = "values", "columns"
-"""Keys of the record of a piece of draws: numbers, shape (draws, columns), and columns by name."""
 
 
-@dataclass(frozen=True)
-class Column:
-    """Column of a table of draws: one number for every draw."""
+class Store(Protocol):
+    """Records of finished points by fingerprint."""
 
-    unit: str
-    words: str
+    @property
+    def seconds(self) -> Mapping[str, float]:
+        """Computing time of every point [s], by fingerprint."""
+
+    def read(self, fingerprint: str) -> Record:
+        """Return the record of the point with a fingerprint; all records together may exceed the memory."""
+
+    def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
+        """Store the record and the computing time [s] of the point with a fingerprint, before this returns."""
 
 
 class Part(Table):
@@ -87,9 +92,11 @@ class Part(Table):
         """
         raise NotImplementedError
 
-    def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:  # noqa: ARG002
-        """Return the columns of numbers that each draw has, by name; empty for a part without draws."""
-        return {}
+    def store(
+        self, folder: Path, points: Mapping[str, Point], problem_files: ProblemFiles
+    ) -> AbstractContextManager[Store]:
+        """Return the store of ranges of draws, points by their fingerprints, in a folder; other parts have none."""
+        raise NotImplementedError
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return records, in the order of the points, as one labelled dataset."""

@@ -1,8 +1,7 @@
 """Stores of finished points of a study, by fingerprint.
 
-There are two stores, for two shapes of records. A point of most kinds takes milliseconds to minutes, and the shape of
-its record depends on its engine. Such a record is one line of a file. A changed study keeps the lines of unchanged
-points. Random draws are millions of rows with equal columns; each piece of them is a file of NumPy arrays.
+A point of most kinds takes milliseconds to minutes, and the shape of its record depends on its engine. Such a record is
+one line of a file. A changed study keeps the lines of unchanged points. A part of many draws has a store of its own.
 """
 
 from __future__ import annotations
@@ -11,16 +10,12 @@ import hashlib
 import json
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import AbstractContextManager, ExitStack
 from io import FileIO
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
-import numpy as np
-
-from laufruhe.errors import refused
-from laufruhe.numerics.locks import folder_lock
-from laufruhe.studies.part import COLUMNS, VALUES, Column, Part, Record
+from laufruhe.studies.part import Part, Record, Store
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import Point, ProblemFiles
 
@@ -28,20 +23,6 @@ Task: TypeAlias = tuple[Part, Point]
 FINISHED_POINTS = ".unfinished-points.jsonl"
 # length of a line's checksum
 _SUM = 32
-
-
-class Store(Protocol):
-    """Records of finished points by fingerprint."""
-
-    @property
-    def seconds(self) -> Mapping[str, float]:
-        """Computing time of every point [s], by fingerprint."""
-
-    def read(self, fingerprint: str) -> Record:
-        """Return the record of the point with a fingerprint; all records together may exceed the memory."""
-
-    def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
-        """Store the record and the computing time [s] of the point with a fingerprint, before this returns."""
 
 
 class FinishedPoints(AbstractContextManager["FinishedPoints"]):
@@ -96,67 +77,20 @@ def _checksum(line: bytes) -> bytes:
     return hashlib.sha256(line).hexdigest()[:_SUM].encode()
 
 
-class Draws(AbstractContextManager["Draws"]):
-    """Finished pieces of random draws of one part, each a file of NumPy arrays in a folder that stays.
-
-    A file appears whole under the fingerprint of its piece. A file that is cut, changed or misplaced does not match
-    the checksums or the fingerprint in it, and its piece is computed again.
-    """
-
-    def __init__(self, folder: Path, columns: Mapping[str, Column], points: Mapping[str, Point]) -> None:
-        self._folder, self._columns, self._points, self._locked = folder, columns, points, ExitStack()
-        remedy = "name another place by --out"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            is_locked = self._locked.enter_context(folder_lock(folder, wait=False))
-        except OSError as error:
-            raise refused("results", str(folder), f"cannot be written ({error.strerror})", remedy) from None
-        if is_locked is False:
-            raise refused("results", str(folder), "is being written by another run", f"wait for it, or {remedy}")
-        self.seconds: dict[str, float] = {}
-        for fingerprint in points:
-            # damaged files raise any error of their codec
-            with suppress(Exception), (folder / f"{fingerprint}.npz").open("rb") as stream:
-                piece = np.load(stream)
-                if piece["fingerprint"] == fingerprint and len(piece[VALUES]):
-                    self.seconds[fingerprint] = float(piece["seconds"])
-
-    def read(self, fingerprint: str) -> Record:
-        """Return the record of a piece."""
-        with np.load(self._folder / f"{fingerprint}.npz") as piece:
-            return {VALUES: piece[VALUES], COLUMNS: self._columns}
-
-    def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
-        """Write the file of a finished piece and its computing time [s]."""
-        point, unfinished = self._points[fingerprint], self._folder / "unfinished"
-        arrays: dict[str, Any] = {
-            VALUES: record[VALUES], "quantities": list(self._columns), "case": point.case.name, "draws": point.span,
-            "units": [column.unit for column in self._columns.values()], "fingerprint": fingerprint, "seconds": seconds,
-        }  # fmt: skip
-        with unfinished.open("wb") as stream:
-            np.savez_compressed(stream, **arrays)
-        unfinished.replace(self._folder / f"{fingerprint}.npz")
-        self.seconds[fingerprint] = seconds
-
-    def __exit__(self, *_: object) -> None:
-        self._locked.close()
-
-
 def stores_of(
     study: StudyFile, problem_files: ProblemFiles, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
     """Yield each store of results, with the fingerprints of all points that belong to it, finished or not.
 
-    A range of random draws is a file of its own (`Draws`). The record of any other point is a line of the file
-    `finished` (`FinishedPoints`).
+    Ranges of draws belong to the store of their part, in a folder that stays. The record of any other point is a line
+    of the file `finished` (`FinishedPoints`).
     """
     others = set(tasks)
     for part in study.study.parts:
-        if columns := part.columns(problem_files):
-            drawn = {
-                fingerprint: point for fingerprint, (owner, point) in tasks.items() if owner is part and point.span
-            }
-            yield stores.enter_context(Draws(draws_in(finished.parent) / part.name, columns, drawn)), drawn
+        drawn = {fingerprint: point for fingerprint, (owner, point) in tasks.items() if owner is part and point.span}
+        if drawn:
+            folder = draws_in(finished.parent) / part.name
+            yield stores.enter_context(part.store(folder, drawn, problem_files)), drawn
             others -= set(drawn)
     yield stores.enter_context(FinishedPoints(finished, others)), others
 

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError, SolverError
+from laufruhe.extensions.random_studies.draws import Draws
 from laufruhe.files.reader import load
 from laufruhe.numerics.workers import working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -25,7 +26,7 @@ from laufruhe.solvers import solve
 from laufruhe.studies import scenes
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
-from laufruhe.studies.stores import FINISHED_POINTS, Draws
+from laufruhe.studies.stores import FINISHED_POINTS
 from problem_files import PROBLEMS, changed, written
 
 SINGLE, FOUR = "tractor-single.toml", "tractor-four-lanchester.toml"

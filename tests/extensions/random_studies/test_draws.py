@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError
+from laufruhe.extensions.random_studies.draws import VALUES, Column, Draws
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.studies.part import VALUES, Column
 from laufruhe.studies.scenes import Point
-from laufruhe.studies.stores import Draws
 
 COLUMNS = {"objective": Column("N", "force"), "x": Column("1", "x")}
 CASE = CaseTable(name="c", problem="c.toml")

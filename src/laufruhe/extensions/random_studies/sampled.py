@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
+from laufruhe.extensions.random_studies.draws import COLUMNS, VALUES, Column, Draws
 from laufruhe.files import fields as f
 from laufruhe.numerics.arrays import Array
 from laufruhe.present import picture as p
-from laufruhe.studies.part import COLUMNS, VALUES, Part
+from laufruhe.studies.part import Part
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.units import readable
 
@@ -59,6 +61,14 @@ class Sampled(Part):
             if name != names[0][1]:
                 rule = f"is {name} in '{case.name}' and {names[0][1]} in '{names[0][0].name}'"
                 raise problem_files.refused(case, "objective", rule, "give each its own part")
+
+    def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:
+        """Return the columns of numbers that each draw has, by name."""
+        raise NotImplementedError
+
+    def store(self, folder: Path, points: Mapping[str, Point], problem_files: ProblemFiles) -> Draws:
+        """Return the store of the pieces of draws."""
+        return Draws(folder, self.columns(problem_files), points)
 
     def spans(self) -> list[tuple[int, int]]:
         """Return (first draw, end) of every piece."""

@@ -11,8 +11,8 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from laufruhe.cli import app
+from laufruhe.extensions.random_studies import sampled
 from laufruhe.report import study_report
-from laufruhe.studies import sampled
 from problem_files import PROBLEMS
 
 DRAWS = 12

@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
-from laufruhe.files.study_tables import DrawnTable, Span, span_of
+from laufruhe.extensions.random_studies.draws import VALUES, Column
+from laufruhe.extensions.random_studies.sampled import Sampled, in_unit, percentiles_of, share_below
+from laufruhe.files import fields as f
+from laufruhe.files.fields import Table
+from laufruhe.files.study_tables import Span, Value, span_of
+from laufruhe.numerics.arrays import Array
 from laufruhe.present import picture as p
 from laufruhe.solvers.conclusion import decision_values
-from laufruhe.studies.part import VALUES, Column, Record
-from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
+from laufruhe.studies.part import Record
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.swept_report import NOTHING_OPEN
@@ -33,6 +36,19 @@ _CODES = {"status": STATUSES, "proof": PROOFS}
 _WORDS = {"objective_given": "initial design", "objective": "final design", "lower_bound": "lower bound"}
 
 
+class DrawnTable(Table):
+    """Quantity of the problem that is drawn at random, evenly between two ends."""
+
+    quantity: str = f.required("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
+    first: int | float | str = Field(alias="from")
+    last: int | float | str = Field(alias="to")
+    spacing: Literal["linear", "log"] = "linear"
+
+    def span(self) -> Span:
+        """Return the range; raise `Refused` if its ends do not fit."""
+        return span_of(self.quantity, self.first, self.last, self.spacing)
+
+
 class RandomScenes(Sampled):
     """Numbers of the problem file drawn at random; every random problem is decided as by `laufruhe solve`."""
 
@@ -44,18 +60,18 @@ class RandomScenes(Sampled):
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
         """Return the readers of the drawn quantities."""
-        return [(f"vary[{k + 1}]", partial(span_of, table)) for k, table in enumerate(self.vary)]
+        return [(f"vary[{k + 1}]", table.span) for k, table in enumerate(self.vary)]
 
     def drawn(self) -> list[Span]:
         """Return the drawn quantities with their ranges."""
-        return [span_of(table) for table in self.vary]
+        return [table.span() for table in self.vary]
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return the batches of draws of every case; check that its problem builds at the ends of all ranges."""
         for case in self.cases:
             for span in self.drawn():
                 for end in (span.low, span.high):
-                    problem_files.problem(Point(case, {span.quantity: span.value(end)}))
+                    problem_files.problem(Point(case, {span.quantity: _value(span, end)}))
         self.check_objective(problem_files)
         return [Point(case, span=span) for case in self.cases for span in self.spans()]
 
@@ -64,7 +80,7 @@ class RandomScenes(Sampled):
         spans = self.drawn()
         columns = {span.quantity: Column(span.unit, span.quantity) for span in spans}
         for case in self.cases:
-            problem = problem_files.problem(Point(case, {span.quantity: span.value(span.low) for span in spans}))
+            problem = problem_files.problem(Point(case, {span.quantity: _value(span, span.low) for span in spans}))
             name, unit = problem.objective_name, problem.objective_unit or ""
             columns |= {key: Column(unit, f"{name}, {words}") for key, words in _WORDS.items()}
             columns |= {key: Column("1", key) for key in _CODES}
@@ -77,10 +93,10 @@ class RandomScenes(Sampled):
         assert point.span is not None
         spans, names = self.drawn(), list(self.columns(problem_files))
         shares = self.random(point.span, len(spans))
-        drawn = np.stack([span.numbers(shares[:, k]) for k, span in enumerate(spans)], axis=1)
+        drawn = np.stack([_numbers(span, shares[:, k]) for k, span in enumerate(spans)], axis=1)
         rows = []
         for numbers in drawn:
-            changes = {span.quantity: span.value(x) for span, x in zip(spans, numbers, strict=True)}
+            changes = {span.quantity: _value(span, x) for span, x in zip(spans, numbers, strict=True)}
             try:
                 record = solve_scene(problem_files.problem(replace(point, changes=changes, span=None)))
             except (InputError, ModelError):
@@ -136,3 +152,16 @@ class RandomScenes(Sampled):
         panel = p.Panel(marks, x, p.Axis("scenes below [%]", (0.0, 100.0)))
         words_above = f"{data.sizes['draw']:,} random scenes a case, each optimised separately."
         return p.Picture(data.attrs["title"], words_above, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))
+
+
+def _numbers(span: Span, shares: Array) -> Array:
+    # numbers in a range at fractions of it
+    low, high = span.low, span.high
+    return low * (high / low) ** shares if span.is_log else low + (high - low) * shares
+
+
+def _value(span: Span, number: float) -> Value:
+    # a number as a problem file has it
+    if not span.is_text:
+        return float(number)
+    return f"{float(number)!r}" if span.unit == "1" else f"{float(number)!r} {span.unit}"

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
+from laufruhe.extensions.random_studies.draws import VALUES, Column
+from laufruhe.extensions.random_studies.sampled import Sampled, in_unit, percentiles_of, share_below
 from laufruhe.load_models.batch import Designs, prepare
 from laufruhe.numerics.arrays import Array
 from laufruhe.present import picture as p
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import decision_values
-from laufruhe.studies.part import VALUES, Column, Record, variable
-from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
+from laufruhe.studies.part import Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.text import Text, marked_table, number
