@@ -86,7 +86,7 @@ def test_every_kind_is_computed_and_shown() -> None:
     modules = {path.stem for path in Path(kinds.__file__).parent.glob("[a-z]*.py")}
     homes = HOMES["study_kinds"].items()
     there = {name for name, home in homes if (Path(laufruhe.__file__).parent / "extensions" / home).exists()}
-    assert {name.replace(" ", "_") for name in KINDS} == modules | there
+    assert {name.replace(" ", "_") for name in KINDS} == modules | {name.replace(" ", "_") for name in there}
     for kind in KINDS.values():
         for said in ("points", "answer", "dataset", "table", "picture"):
             assert getattr(kind, said) is not getattr(Part, said)
