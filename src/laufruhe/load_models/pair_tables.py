@@ -4,20 +4,18 @@ Throw k stands on step p_k of the star and adds load rows m_k(p_k) to the rows V
 
     |V0 + sum_k m_k(p_k)|^2 = c + sum_k L_k(p_k) + 2 sum_{k<l} m_k(p_k) . m_l(p_l).
 
-The tables of L and of the products have the same size for any number of orders, sections and operating points. A search
-that places one throw after the other adds to the squares at each step.
+The tables of L and of the products have the same size for any number of orders, sections and operating points.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from laufruhe.load_models.star_model import StarNorm, StarProblem
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.crank_stars import Stars
+from laufruhe.physics.crank_stars import Stars, StarSpace
 
 _ROUNDING = 1e-13
 
@@ -45,23 +43,13 @@ class PairTable:
 
     def squares(self, stars: Stars) -> Array:
         """Return the squared norm of each of n crank stars, shape (n,), from the step of every throw, (n, throws)."""
+        steps, (throws, count) = stars.astype(np.intp), self.linear.shape
         total = np.full(len(stars), self.constant)
-        for k in range(stars.shape[1]):
-            total += self.increments(stars, stars[:, k], k)
+        for k in range(throws):
+            total += self.linear[k, steps[:, k]]
+            for earlier in range(k):
+                total += self.pairs[earlier, k].reshape(-1)[steps[:, earlier] * count + steps[:, k]]
         return total
-
-    def increments(self, stars: Stars, steps: Stars, throw: int) -> Array:
-        """Return the increase of the squared norms, shape (n,), when a throw is added to n incomplete crank stars.
-
-        `stars` has the steps of the throws before this one, shape (n, at least `throw`), and `steps` the step of the
-        new throw in each star, shape (n,).
-        """
-        total = self.linear[throw, steps]
-        count = self.linear.shape[1]
-        for earlier in range(throw):
-            table = self.pairs[earlier, throw].reshape(-1)
-            total += table[stars[:, earlier].astype(np.intp) * count + steps]
-        return np.asarray(total)
 
 
 def pair_table(norm: StarNorm) -> PairTable:
@@ -98,19 +86,18 @@ class PairObjective:
         """Tables of the terms, then of the limits."""
         return [table for _, table in (*self.terms, *self.limits)]
 
-    def values(self, squares: Array) -> Array:
-        """Return the objective of n crank stars, from the squared norms of all tables, shape (n, tables).
+    def values(self, _: StarSpace, stars: Stars) -> Array:
+        """Return the objective of n crank stars, below their rounding errors; infinite for one that violates a limit.
 
-        It is infinite for a star that violates a limit.
+        `stars` has the step of every throw, shape (n, throws).
         """
-        total = np.zeros(len(squares))
-        for k, (weight, _) in enumerate(self.terms):
-            total += weight * np.sqrt(np.maximum(squares[:, k], 0.0))
-        for k, (maximum, table) in enumerate(self.limits, len(self.terms)):
-            total[squares[:, k] > maximum**2 * (1.0 + 1e-9) + table.rounding] = np.inf
+        total, squares = np.zeros(len(stars)), [table.squares(stars) for table in self.tables]
+        for (weight, table), square in zip(self.terms, squares, strict=False):
+            total += weight * np.sqrt(np.maximum(square - table.rounding, 0.0))
+        for (maximum, table), square in zip(self.limits, squares[len(self.terms) :], strict=True):
+            total[square > maximum**2 * (1.0 + 1e-9) + table.rounding] = np.inf
         return total
 
-    def lower_value(self, squares: Array) -> float:
-        """Return a lower bound of the objective under rounding errors, from one row of squares, shape (tables,)."""
-        terms = zip(self.terms, squares, strict=False)
-        return sum(weight * math.sqrt(max(square - table.rounding, 0.0)) for (weight, table), square in terms)
+    def lower_bound(self, _: StarSpace) -> float:
+        """Return a lower bound over all crank stars: zero."""
+        return 0.0

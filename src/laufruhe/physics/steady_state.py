@@ -157,17 +157,3 @@ class TimeMounting:
             state = periodic_state(self.mounting, wrench, speed, self.samples, INTEGRATION)
             self._states[key] = wrench, state
         return self._states[key][1]
-
-
-def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
-    """Return the mount forces (n, mounts, 3) [N] of the equations that time integrates, without bump stops (E25, E26).
-
-    A comparison with these forces shows the error of the integration alone; one with `ElasticMounting.forces`
-    shows the effect of E26.
-    """
-    model = time_model(mounting)
-    omega = wrench.orders[:, None, None] * speed
-    impedance = model.stiffness + 1j * omega * model.damping - omega**2 * np.eye(model.size)
-    y = np.linalg.solve(impedance, (wrench.coefficients @ model.load.T)[..., None])
-    forces = (model.forces + 1j * omega * model.damping_forces) @ y
-    return Spectrum(wrench.base, forces.reshape(len(omega), -1, 3))

@@ -17,7 +17,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
 from laufruhe.solvers.stars.cut_search import search_designs
-from laufruhe.solvers.stars.enumeration import MAX_SLOTS, StarSearchResult, enumerate_orders, enumerate_stars
+from laufruhe.solvers.stars.enumeration import MAX_SLOTS, StarSearchResult, enumerate_stars
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
 
@@ -130,7 +130,7 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
             )
         model = family.model(phasing)
         pairs = PairObjective.from_problem(model.at(model.samples))
-        search = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
+        search = enumerate_stars(family.space, pairs, phasing.best, phasing.time_limit)
         result = enumeration_result(phasing, family, search, "firing orders evaluated by pairs of throws")
         return replace(result, infeasible=0 if result.designs else search.nodes)
     objectives = [objective for family in families if (objective := amplitudes(phasing, family)) is not None]
