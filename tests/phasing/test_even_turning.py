@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,10 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.machine.firing import lap_orders
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status
-from laufruhe.solvers.throws.stored_work import work_for_bounds
 from one_cylinder import irregularity
 
 THROWS = [0, 50, 130, 180, 265]
@@ -131,18 +129,3 @@ def test_a_number_of_the_wheel_alone_is_the_same_for_uneven_throws() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value == pytest.approx(result.objective.initial, rel=1e-12)
     assert result.certificate.lower_bound == pytest.approx(result.objective.value, rel=1e-3)
-
-
-@pytest.mark.parametrize("kinematics", ["exact", "two-order"])
-@pytest.mark.parametrize("share", [1.1, float("inf")])
-def test_work_in_place_of_a_degree_never_raises_it(kinematics: str, share: float) -> None:
-    """Firing orders, none of them better than is known; with two orders of the pistons nothing is told."""
-    phasing, told = problem_of(phasing=WIDE).phasing, []
-    for order in itertools.islice(lap_orders(phasing.cycle, phasing.layout(None, None), phasing.throws), 5):
-        engine, fidelity = {"throws": THROWS, "firing_order": list(order)}, {"samples": 240, "kinematics": kinematics}
-        own = problem_of(engine, fidelity=fidelity)
-        value = objective_value(own, evaluate(own))
-        work = work_for_bounds(own, share * value)(own)
-        told.append(objective_value(work, evaluate(work)) / value)
-    assert max(told) <= 1.0 + 1e-9
-    assert (max(told) > 0.3) is (kinematics == "exact")

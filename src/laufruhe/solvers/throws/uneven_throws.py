@@ -41,7 +41,7 @@ from laufruhe.solvers.smooth.program import TURN, SmoothProgram
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
-from laufruhe.solvers.throws.stored_work import with_work_for_search, work_for_bounds
+from laufruhe.solvers.throws.stored_work import has_degree, with_work
 from laufruhe.solvers.throws.throw_search import ThrowBound, search_throws
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
@@ -95,10 +95,9 @@ def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None)
         return evaluate_crank(phasing, candidate)
 
     box_bound = None
-    if not designs or phasing.thorough:
-        with_work = work_for_bounds(problem, designs[0].value if designs else math.inf)
-        phasing_of_work = replace(phasing, problem_of=lambda candidate: with_work(phasing.problem_of(candidate)))
-        box_bound = search_throws(with_work(problem), phasing_of_work, designs[0] if designs else None, floor, improve)
+    # the degree of irregularity is no sum over cylinders
+    if (not designs or phasing.thorough) and not has_degree(problem):
+        box_bound = search_throws(problem, phasing, designs[0] if designs else None, floor, improve)
     if box_bound is not None:
         floor, source = max(floor, box_bound.bound), f"{box_bound.boxes} {box_bound.what}"
         if box_bound.best is not None and box_bound.best not in designs:
@@ -196,7 +195,7 @@ def local_optimum(
     best = _if_feasible(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
-    problem = with_work_for_search(replace(phasing.problem_of(start), phasing=None))
+    problem = with_work(replace(phasing.problem_of(start), phasing=None))
     # the exact model checks limits on numbers of the crank, which are not in the program
     problem = replace(problem, limits=problem.load_limits)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
