@@ -42,19 +42,13 @@ class BatchNorm:
     rows
         Coefficients R of k load rows, shape (components, features, k).
     source
-        Norm of the load rows before equal rows are merged; None if no samples may be left out.
+        Norm of the load rows; None if no samples may be left out.
     """
 
     norm: Norm
     rows: Array
     grid: Grid
     source: AffineNorm | None = None
-
-    @classmethod
-    def merged(cls, norm: Norm, rows: Array, weights: Array, source: AffineNorm | None = None) -> BatchNorm:
-        """Return a norm of rows, shape (components, features, k), in which equal rows are merged."""
-        rows, weights = _merged(rows, weights)
-        return cls(norm, np.ascontiguousarray(rows), Grid(weights, len(weights)), source)
 
     @cached_property
     def coarser(self) -> tuple[BatchNorm, ...]:
@@ -66,7 +60,8 @@ class BatchNorm:
         for samples in (n for n in range(FEWEST, steps) if steps % n == 0):
             if samples >= GROWTH * count:
                 count, times = samples, steps // samples
-                norms.append(BatchNorm.merged(self.norm, rows[:, :, ::times], times * weights[::times]))
+                grid = Grid(times * weights[::times], samples)
+                norms.append(BatchNorm(self.norm, np.ascontiguousarray(rows[:, :, ::times]), grid))
         return tuple(norms)
 
     def values_within(self, tolerance: float, features: Array, threads: int = 1) -> Array:
@@ -212,9 +207,8 @@ def prepare(problem: Problem) -> Designs:
     def batched(measure: Measure) -> BatchNorm:
         # peaks have the finer samples of the exact evaluation (M6)
         norm = model.norm(measure, model.full_samples * (measure.norm.refinement if measure.is_load else 1))
-        if norm.norm.is_monotone_in_lengths:
-            return BatchNorm.merged(norm.norm, feature_rows(norm), norm.grid.weights, norm)
-        return BatchNorm(norm.norm, np.ascontiguousarray(feature_rows(norm)), norm.grid)
+        rows = np.ascontiguousarray(feature_rows(norm))
+        return BatchNorm(norm.norm, rows, norm.grid, norm if norm.norm.is_monotone_in_lengths else None)
 
     measures = [term.measure for term in problem.load_terms] + [limit.measure for limit in problem.load_limits]
     return Designs(model, {measure: batched(measure) for measure in measures})
@@ -223,17 +217,3 @@ def prepare(problem: Problem) -> Designs:
 def feature_rows(norm: AffineNorm) -> Array:
     """Return the constant rows V0 and slopes B of a norm in the layout of `BatchNorm.rows`, shape (d, 1 + n, k)."""
     return np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
-
-
-def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:
-    # rows that are equal up to sign have equal lengths: each once, with the sum of the weights
-    flat = rows.reshape(-1, rows.shape[2]).T
-    leading = np.take_along_axis(flat, np.argmax(flat != 0.0, axis=1)[:, None], axis=1)
-    _, first, inverse = np.unique(
-        flat * np.where(leading < 0.0, -1.0, 1.0), axis=0, return_index=True, return_inverse=True
-    )
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    total: Array = np.bincount(rank[inverse.ravel()], weights=weights, minlength=len(order)).astype(float)
-    return rows[:, :, first[order]], total
