@@ -11,10 +11,9 @@ import numpy as np
 
 from laufruhe.extensions.robust.built_engines import (
     Adversary,
-    BuiltEngines,
+    SampledEngines,
     WorstEngines,
     evaluate_built,
-    objective_values,
     violated_limits,
 )
 from laufruhe.extensions.robust.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
@@ -129,9 +128,10 @@ def robust_result(
     # random engines that no decision has used
     count = CHECKED if tolerances.is_affine else min(population.engines, CHECKED_CURVED)
     errors = tolerances.draw(np.random.default_rng([population.seed, 1]), count)
-    objectives = _objectives(problem, robust.values, errors, adversary.samples)
+    engines = SampledEngines(problem, errors, adversary.samples)
+    objectives = engines.objectives(robust.values)
     nominal_worst = adversary.at(nominal, proven=True)
-    nominal_objectives = _objectives(problem, nominal, errors, adversary.samples)
+    nominal_objectives = engines.objectives(nominal)
     exceeding = int((objectives > worst.bound * (1.0 + 1e-12)).sum())
     # Clopper and Pearson (R10)
     at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, count - exceeding)) if exceeding < count else 1.0
@@ -170,14 +170,6 @@ def robust_result(
     )
 
 
-def _objectives(problem: Problem, values: Sequence[Value], errors: Array, samples: int) -> Array:
-    # objective of each engine, shape (engines,); affine loads are evaluated together
-    if tolerances_of(problem).is_affine:
-        return objective_values(BuiltEngines(problem, values, samples).terms, errors)
-    engines = (evaluate_built(with_errors(problem, z), values, samples) for z in errors)
-    return np.array([objective_value(problem, engine) for engine in engines])
-
-
 def _design(
     name: str, problem: Problem, values: Sequence[Value], worst_engines: WorstEngines, objectives: Array, share: float
 ) -> BuiltDesign:
@@ -209,7 +201,8 @@ def _priced_tolerances(
         # objective of the active error sets, or of the share of engines, with one tolerance times the factor
         scaled_problem = with_tolerances(problem, tolerances_of(problem).scaled(name, factor))
         if robust_of(problem).population.share is not None:
-            return float(np.quantile(_objectives(scaled_problem, robust.values, engine_errors, samples), share))
+            engines = SampledEngines(scaled_problem, engine_errors, samples)
+            return float(np.quantile(engines.objectives(robust.values), share))
         total, active = 0.0, robust.active
         for errors, weight, prices in zip(active.errors, active.shares, active.prices, strict=True):
             limit_prices = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
