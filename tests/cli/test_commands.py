@@ -24,7 +24,7 @@ PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
 TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv"}
 DECIDED = {"shafts.csv", "decisions.csv", "limits.csv", "weights.csv"}
 ALL_FILES = PAGES | TABLES | DECIDED
-ALL_FILES |= {f"{name}.svg" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
+ALL_FILES |= {f"{name}.svg" for name in ("engine", "polar", "ellipses", "cycle", "bars", "spectrum")}
 
 
 def run(*words: object) -> Result:

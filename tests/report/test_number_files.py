@@ -150,7 +150,14 @@ def test_points_of_one_name_have_a_column_each() -> None:
 
 @pytest.mark.slow
 def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) -> None:
-    found = number_tables(evaluate_only(load(PROBLEMS / "study-soft-mounts.toml")))
+    result = evaluate_only(load(PROBLEMS / "study-soft-mounts.toml"))
+    found, block = number_tables(result), result.final.engine.block
+    assert block is not None
+    rows = [dict(zip(found["mounts"].head, row, strict=True)) for row in found["mounts"].rows]
+    # the springs carry the weight, and the block sags on them without tilt
+    assert sum(row["stiffness z [N/mm]"] * row["sag [mm]"] for row in rows) == pytest.approx(9.80665 * block.mass)
+    (mounting,) = found["mounting"].rows
+    assert mounting[1] == pytest.approx(rows[0]["sag [mm]"])
     assert {"modes", "transmissibility", "forces"} <= set(found)
     assert any(head.startswith("travel at front left") for head in found["forces"].head)
     assert len(found["modes"].rows) == 6

@@ -28,6 +28,7 @@ KINDS = ("png", "svg")
 TABLES = (
     "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings", "torque",
     "indicator", "uneven-firing", "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
+    "mounts", "mounting",
     "reach", "objectives-in-order", "equal-optima", "weights", "shafts", "balance-factors", "crankshaft-torque",
     "gas-pressure", "load-cases", "even-speeds",
 )  # fmt: skip

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.bearing_loads import wear_of
 from laufruhe.physics.fidelity import Fidelity
@@ -43,6 +44,7 @@ from laufruhe.present.measures import (
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
 from laufruhe.present.tables import Table
+from laufruhe.problem.channels import MOUNT_TRAVEL
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_with_phases
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.report import files
@@ -51,6 +53,7 @@ from laufruhe.report.sections import tables_of as printed_tables
 from laufruhe.report.table_files import write_book, write_csv
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue, LimitValue
+from laufruhe.units import readable
 
 MAX_ROWS = 20 * STEPS
 
@@ -267,6 +270,36 @@ def _mount_criticals(result: Result) -> Table:
     return Table(head, rows)
 
 
+def _mounts(result: Result) -> Table:
+    (length, millimetres), (per_length, stiffer), rows = readable("m"), readable("N/m"), []
+    points = result.problem.points
+    for name, design in result.designs.items():
+        facts = facts_of(design)
+        travels = [place_measures(design, k, MOUNT_TRAVEL) for k in range(len(points))]
+        for m, spring in every_spring(design.engine.mounts):
+            rows.append([
+                name, spring.name, *(millimetres * along for along in spring.position),
+                *(stiffer * along for along in spring.stiffness), spring.loss_factor,
+                millimetres * float(facts.mount_sag[m]), *(millimetres * travel[m].max for travel in travels),
+            ])  # fmt: skip
+    head = ["design", "mount", *(f"{axis} [{length}]" for axis in "xyz"),
+            *(f"stiffness {axis} [{per_length}]" for axis in "xyz"), "loss factor [-]", f"sag [{length}]",
+            *(f"largest travel at {point.name} [{length}]" for point in points)]  # fmt: skip
+    return Table(head, rows)
+
+
+def _mounting(result: Result) -> Table:
+    (length, millimetres), rows = readable("m"), []
+    for name, design in result.designs.items():
+        facts = facts_of(design)
+        rows.append([name, millimetres * facts.sag, millimetres * facts.torque_travel, *facts.torque_roll_axis.tolist(),
+                     facts.torque_roll_coupling, facts.torque_roll_frequency])  # fmt: skip
+    head = ["design", f"sag of the centre of gravity [{length}]", f"largest travel by the mean torque [{length}]",
+            *(f"torque-roll axis {axis} [-]" for axis in "xyz"), "torque-roll coupling [-]",
+            "torque-roll frequency [Hz]"]  # fmt: skip
+    return Table(head, rows)
+
+
 _TABLES: NumberTables = {
     "decisions": (lambda result: result.decisions, lambda result: _values(result.decisions)),
     "limits": (limits_of, lambda result: _values(limits_of(result))),
@@ -289,6 +322,8 @@ _TABLES: NumberTables = {
     "wear": (has_bearings, _wear),
     "turning-parts": (is_twin, _turning),
     "mount-critical-speeds": (is_elastic, _mount_criticals),
+    "mounts": (is_elastic, _mounts),
+    "mounting": (is_elastic, _mounting),
 }
 
 
