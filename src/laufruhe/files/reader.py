@@ -156,7 +156,7 @@ def _loaded(tables: Mapping[str, Any], path: Path) -> Problem:
                     stars = replace(phasing, problem_of=lambda star: finished(phasing.problem_of(star), star))
                     problem = replace(problem, phasing=stars)
             _check_decisions(problem)
-            return replace(problem, origin=FileOrigin(tables, path))
+            return replace(problem, origin=Origin(tables, path))
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, file_model())) from None
     except ModelError as error:
@@ -196,23 +196,22 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
 
 
-class FileOrigin(Origin):
-    """Tables of a problem file, which edits change."""
+def edited(origin: Origin, edit: str, *arguments: Any) -> Problem:
+    """Return the problem of a file after an edit, the name of a function of `edits`, with its arguments."""
+    with errors_in_file(origin.path):
+        tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))
+    return load_tables(tables, origin.path)
 
-    def edited(self, edit: str, *arguments: Any) -> Problem:
-        """Return the problem after an edit, the name of a function of `edits`, with its arguments."""
-        with errors_in_file(self.path):
-            tables = getattr(edits, edit)(self.tables, *plain(arguments, DEEPEST))
-        return load_tables(tables, self.path)
 
-    def number(self, name: str) -> tuple[float, str]:
-        """Return value or start of a number [SI], by its name in results or its path, and its unit."""
-        with errors_in_file(self.path):
-            return edits.number(self.tables, name)
+def number_of(origin: Origin, name: str) -> tuple[float, str]:
+    """Return value or start of a number of a file [SI], by its name in results or its path, and its unit."""
+    with errors_in_file(origin.path):
+        return edits.number(origin.tables, name)
 
-    def to_toml(self) -> str:
-        """Return the text of the problem file."""
-        return toml_text(self.tables)
+
+def text_of(origin: Origin) -> str:
+    """Return the text of a problem file."""
+    return toml_text(origin.tables)
 
 
 def _changed_drawing(

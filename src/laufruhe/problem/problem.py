@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path as FilePath
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -123,29 +123,11 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class Origin(ABC):
-    """File of a problem.
-
-    Attributes
-    ----------
-    tables, path
-        Tables as they were read, and path of the file.
-    """
+class Origin:
+    """File of a problem: its tables as they were read, and its path."""
 
     tables: Mapping[str, Any]
     path: FilePath
-
-    @abstractmethod
-    def edited(self, edit: str, *arguments: Any) -> Problem:
-        """Return the problem after an edit of its tables, by the name of the edit and its arguments."""
-
-    @abstractmethod
-    def number(self, name: str) -> tuple[float, str]:
-        """Return value or start of a number [SI], by its name in results or its path, and its unit."""
-
-    @abstractmethod
-    def to_toml(self) -> str:
-        """Return the text of the problem file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,7 +354,7 @@ class Problem(Goals, Statements):
             return None
         return units.pop() if len(units) == 1 else ""
 
-    def with_values(self, values: Mapping[str, Any]) -> Problem:
+    def with_values(self, values: Mapping[str, Any]) -> Self:
         """Return the problem with other numbers of its file, named as in results or by paths as in studies.
 
         An open number starts at its new value and stays open.
@@ -392,44 +374,44 @@ class Problem(Goals, Statements):
             raise wrong_call("values", values, "is no table of names and values", 'write {"engine.rod_ratio": 0.28}')
         for name in values:
             _check_name(name)
-        return self._edited("with_values", values)
+        return cast("Self", self._by_reader("edited", "with_values", values))
 
-    def open(self, name: str, low: Any, high: Any, start: Any = None) -> Problem:
+    def open(self, name: str, low: Any, high: Any, start: Any = None) -> Self:
         """Return the problem with one more open number; it starts at its present value unless `start` is given."""
         _check_name(name)
-        return self._edited("open_number", name, low, high, start)
+        return cast("Self", self._by_reader("edited", "open_number", name, low, high, start))
 
-    def fix(self, name: str, value: Any = None) -> Problem:
+    def fix(self, name: str, value: Any = None) -> Self:
         """Return the problem with one number fixed, at `value` or at its start."""
         _check_name(name)
-        return self._edited("fix_number", name, value)
+        return cast("Self", self._by_reader("edited", "fix_number", name, value))
 
     def __getitem__(self, name: str) -> float:
         """Return a number of the problem by its name in results or its path [SI]; an open one at its start."""
-        _check_name(name)
-        return self._file.number(name)[0]
+        return self._number(name)[0]
 
     def quantity(self, name: str, unit: Any = "") -> pint.Quantity[float]:
         """Return a number with its unit [pint], by its name in results or its path, in `unit` if given."""
-        _check_name(name)
-        return quantity(*self._file.number(name), unit)
+        return quantity(*self._number(name), unit)
 
     def to_toml(self) -> str:
         """Return the text of the problem file."""
-        return self._file.to_toml()
+        return str(self._by_reader("text_of"))
+
+    def _number(self, name: str) -> tuple[float, str]:
+        _check_name(name)
+        number: tuple[float, str] = self._by_reader("number_of", name)
+        return number
 
     def _with_goal(self, key: str, keys: Mapping[str, Any], adds: bool) -> Self:
         goal = {name: value for name, value in keys.items() if name != "self" and value is not None}
-        return cast("Self", self._edited("with_goal", key, goal, adds))
+        return cast("Self", self._by_reader("edited", "with_goal", key, goal, adds))
 
-    @property
-    def _file(self) -> Origin:
+    def _by_reader(self, name: str, *arguments: Any) -> Any:
         if self.origin is None:
             raise ModelError(f"{self.name} was made or changed in code; edit numbers right after loading its file")
-        return self.origin
-
-    def _edited(self, edit: str, *arguments: Any) -> Problem:
-        return self._file.edited(edit, *arguments)
+        # by its address, because this room imports no file format
+        return resolve_name(f"laufruhe.files.reader:{name}")(self.origin, *arguments)
 
     def changed(self, **changes: Any) -> Problem:
         """Return the problem with other attributes; with open crank stars, the problem of every star has them too."""

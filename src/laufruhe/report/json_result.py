@@ -102,7 +102,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         },
         "timing": dict(result.timing),
         "versions": versions(),
-        "problem_file": None if problem.origin is None else problem.origin.to_toml(),
+        "problem_file": None if problem.origin is None else problem.to_toml(),
     }  # fmt: skip
 
 
