@@ -25,6 +25,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.machine import Bearing, Engine, OperatingPoint, Seiliger, SliderCrank
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
+from laufruhe.machine.scaling import scale_part
 from laufruhe.physics.bearing_loads import crank_forces, main_bearing_forces, pin_forces, piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_cycle import thrust_at
@@ -366,7 +367,7 @@ def test_turning_and_mirroring(turn: float, lead: float, radius: float, angle: f
 
 def test_size_and_speed(five: Problem) -> None:
     """Twice as large at the same densities: forces 16 times at equal speed."""
-    large = replace(five.engine, slider_cranks=tuple(part.scaled(2.0, 8.0) for part in five.engine.slider_cranks))
+    large = replace(five.engine, slider_cranks=tuple(scale_part(part, 2.0, 8.0) for part in five.engine.slider_cranks))
     small = reciprocating_loads(five.engine, SPEED) + rod_inertia_loads(five.engine, SPEED)
     grown = reciprocating_loads(large, SPEED) + rod_inertia_loads(large, SPEED)
     np.testing.assert_allclose(grown.coefficients[:, 1:3], 16.0 * small.coefficients[:, 1:3], rtol=1e-9, atol=1e-6)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class Knuckle:
     master: SliderCrank
     radius: float
     angle: float
+    powers: ClassVar = {"radius": (0, 1)}
 
     def motion(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any]:
         """Return the position of the pin and its first two derivatives by alpha [m], for a cylinder at `bank` (K11)."""
@@ -71,10 +72,6 @@ class Knuckle:
 
         place, _, _ = self.motion(np, _root(slope, 0.0), bank)
         return float(abs(reach - place))
-
-    def scaled(self, length: float, mass: float) -> Knuckle:
-        """Return the pin with lengths and masses multiplied by these factors."""
-        return Knuckle(self.master.scaled(length, mass), self.radius * length, self.angle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,10 +177,6 @@ class ArticulatedCrank(SliderCrank):
             ),
             ((self.rod_inertia_deficit, rod),),
         )
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the mechanism with lengths and masses multiplied by these factors."""
-        return replace(super().scaled(length, mass), knuckle=self.knuckle.scaled(length, mass))
 
 
 def _root(function: Callable[[float], float], start: float) -> float:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
+from laufruhe.machine.scaling import scale_part
 from laufruhe.machine.slider_crank import SliderCrank
 
 
-class Extra(ABC):
+class Extra:
     """A part that an extension adds to an engine; parts with equal numbers compare equal and have equal hashes.
 
     Attributes
@@ -32,9 +32,9 @@ class Extra(ABC):
         moved = self.moved(changes, before, engine.slider_cranks)
         return engine if moved is self else engine.with_extra(moved)
 
-    @abstractmethod
     def scaled(self, length: float, mass: float) -> Self:
         """Return the part of an engine whose lengths and masses are multiplied by these factors."""
+        return scale_part(self, length, mass)
 
     def turning_inertia(self, _parts: Sequence[SliderCrank], /) -> float | None:
         """Return the inertia of all rotating parts except pistons and rods [kg m2]; None if it has none."""

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
@@ -30,10 +30,7 @@ class Facing:
     crank_radius: float
     rod_length: float
     ahead: float
-
-    def scaled(self, length: float) -> Facing:
-        """Return the piston with lengths multiplied by this factor."""
-        return Facing(self.crank_radius * length, self.rod_length * length, self.ahead)
+    powers: ClassVar = {"crank_radius": (0, 1), "rod_length": (0, 1)}
 
     def swept(self, part: SliderCrank) -> Swept:
         """Return the chamber between the piston `part` and this opposed piston."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from laufruhe.errors import ModelError
 
@@ -31,7 +31,3 @@ class LoadTorque:
     def __post_init__(self) -> None:
         if len(self.angles) != len(self.torques) or len(self.angles) < 4:
             raise ModelError("a load torque needs four angles at least, and one torque for each; add points")
-
-    def scaled(self, factor: float) -> LoadTorque:
-        """Return the load with a multiple of its torque."""
-        return replace(self, torques=tuple(factor * torque for torque in self.torques))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -57,6 +58,7 @@ class Mount:
     lag: float = 0.0
     joined: tuple[Mount, ...] = ()
     dynamic: tuple[Dynamic, ...] = ()
+    powers: ClassVar = {"position": (0, 1)}
 
     def __post_init__(self) -> None:
         for what, value in (("stiffness", min(self.stiffness)), ("damping", min(self.damping)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import ClassVar
 
 from laufruhe.errors import ModelError
 
@@ -25,14 +26,11 @@ class Shaft:
     ratio: float = 1.0
     y: float = 0.0
     z: float = 0.0
+    powers: ClassVar = {"y": (0, 1), "z": (0, 1)}
 
     def __post_init__(self) -> None:
         if self.ratio == 0.0:
             raise ModelError(f"shaft '{self.name}' has ratio 0: a shaft that stands still balances nothing")
-
-    def scaled(self, length: float) -> Shaft:
-        """Return the shaft with lengths multiplied by this factor."""
-        return replace(self, y=self.y * length, z=self.z * length)
 
 
 CRANKSHAFT = Shaft("crankshaft")
@@ -69,6 +67,7 @@ class Rotor:
     role: Role = Role.COUNTERWEIGHT
     radius: float | None = None
     reach: float | None = None
+    powers: ClassVar = {"unbalance": (1, 1), **dict.fromkeys(("x", "radius", "reach"), (0, 1))}
 
     @property
     def place(self) -> tuple[float, float, float]:
@@ -108,16 +107,12 @@ class Bearing:
     width: float | None = None
     friction: float | None = None
     shaft: Shaft = CRANKSHAFT
+    powers: ClassVar = dict.fromkeys(("x", "diameter", "width"), (0, 1))
 
     def __post_init__(self) -> None:
         for what, size in (("diameter", self.diameter), ("width", self.width)):
             if size is not None and not size > 0.0:
                 raise ModelError(f"bearing '{self.name}' has a {what} of {size:g} m; it must be positive")
-
-    def scaled(self, length: float) -> Bearing:
-        """Return the bearing with lengths multiplied by this factor."""
-        diameter, width = (None if size is None else size * length for size in (self.diameter, self.width))
-        return replace(self, x=self.x * length, diameter=diameter, width=width, shaft=self.shaft.scaled(length))
 
     @property
     def area(self) -> float:

@@ -108,8 +108,8 @@ class SliderCrank:
     """True if a rod presses the piston against a cylinder wall."""
     is_balanced_by_share: ClassVar[bool] = True
     """True if a counterweight may balance a share of its reciprocating mass (eq. 13)."""
-    dimensions: ClassVar[Mapping[str, tuple[int, int]]] = {
-        **dict.fromkeys(("x", "crank_radius", "rod_length", "offset", "bore"), (0, 1)),
+    powers: ClassVar = {
+        **dict.fromkeys(("x", "crank_radius", "rod_length", "offset", "bore", "big_end"), (0, 1)),
         **dict.fromkeys(("reciprocating_mass", "rotating_mass"), (1, 0)), "rod_inertia_deficit": (1, 2),
     }  # fmt: skip
     """Powers of mass and length in the unit of every number."""
@@ -188,19 +188,8 @@ class SliderCrank:
 
     def only(self, masses: Mapping[str, float]) -> Self:
         """Return the mechanism with these masses alone, by field name."""
-        none: dict[str, Any] = {name: 0.0 for name, (mass_power, _) in self.dimensions.items() if mass_power}
+        none: dict[str, Any] = {name: 0.0 for name, (mass_power, _) in self.powers.items() if mass_power}
         return replace(self, **none | dict(masses))
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the mechanism with lengths and masses multiplied by these factors."""
-        numbers: dict[str, Any] = {
-            name: getattr(self, name) * mass**mass_power * length**length_power
-            for name, (mass_power, length_power) in self.dimensions.items()
-            if getattr(self, name) is not None
-        }
-        big_end = self.big_end and (self.big_end[0] * length, self.big_end[1] * length)
-        facing = self.facing and self.facing.scaled(length)
-        return replace(self, shaft=self.shaft.scaled(length), big_end=big_end, facing=facing, **numbers)
 
     @cached_property
     def star_turn(self) -> Turn:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.layouts import Layout
+from laufruhe.machine.scaling import scale_part
 from laufruhe.problem.decision import Decision, Kind, RotorDrive
 from laufruhe.problem.problem import Drawing, Problem
 
@@ -77,27 +78,15 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
 
 def _scaled(drawing: Drawing, scale: EqualPowerScale) -> Drawing:
     k, m, engine = scale.length, scale.mass, drawing.engine
+    load = engine.load_torque
     engine = replace(
         engine,
-        slider_cranks=tuple(part.scaled(k, m) for part in engine.slider_cranks),
-        rotors=tuple(
-            replace(
-                rotor,
-                unbalance=rotor.unbalance * m * k,
-                radius=None if rotor.radius is None else rotor.radius * k,
-                reach=None if rotor.reach is None else rotor.reach * k,
-            ).placed(*(k * along for along in rotor.place))
-            for rotor in engine.rotors
-        ),
-        bearings=tuple(bearing.scaled(k) for bearing in engine.bearings),
+        slider_cranks=tuple(scale_part(part, k, m) for part in engine.slider_cranks),
+        rotors=tuple(scale_part(rotor, k, m) for rotor in engine.rotors),
+        bearings=tuple(scale_part(bearing, k, m) for bearing in engine.bearings),
         extras=tuple(extra.scaled(k, m) for extra in engine.extras),
-        load_torque=engine.load_torque and engine.load_torque.scaled(1.0 / scale.speed),
-        mounts=tuple(
-            mount.mapped(
-                lambda part: replace(part, position=(k * part.position[0], k * part.position[1], k * part.position[2]))
-            )
-            for mount in engine.mounts
-        ),
+        load_torque=load and replace(load, torques=tuple(torque / scale.speed for torque in load.torques)),
+        mounts=tuple(scale_part(mount, k, m) for mount in engine.mounts),
     )
     return replace(
         drawing,

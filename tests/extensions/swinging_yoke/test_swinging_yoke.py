@@ -15,6 +15,7 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.machine import Chamber, Chambers, Cycle, Engine, OperatingPoint, Pump, Shaft
 from laufruhe.machine.rotor import CRANKSHAFT
+from laufruhe.machine.scaling import scale_part
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque, torque_facts
 
@@ -127,7 +128,7 @@ def test_derivatives(share: float, alpha: float) -> None:
 
 def test_scaled_and_without_mass() -> None:
     part = yoke()
-    larger = part.scaled(2.0, 3.0)
+    larger = scale_part(part, 2.0, 3.0)
     point = OperatingPoint("run", SPEED)
     one, other = (shaking_loads(Engine("one", Cycle.TWO_STROKE, (p,)), point).sample(64) for p in (part, larger))
     assert other[:, 1:3] == pytest.approx(6.0 * one[:, 1:3], rel=1e-9, abs=1e-6)

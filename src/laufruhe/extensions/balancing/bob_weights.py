@@ -45,12 +45,12 @@ class BobWeights(Extra):
     parts: tuple[tuple[str, tuple[float, ...]], ...]
     throws: tuple[tuple[int, ...], ...]
     throw_masses: tuple[tuple[tuple[int, ...], float], ...]
+    powers: ClassVar = {"oil": (1, 0), "parts": (1, 0)}
 
-    def scaled(self, _: float, mass: float) -> Self:
+    def scaled(self, length: float, mass: float) -> Self:
         """Return the parts with their masses multiplied by a factor."""
-        parts = tuple((name, tuple(mass * one for one in masses)) for name, masses in self.parts)
         throws = tuple((cylinders, mass * one) for cylinders, one in self.throw_masses)
-        return replace(self, oil=mass * self.oil, parts=parts, throw_masses=throws)
+        return replace(super().scaled(length, mass), throw_masses=throws)
 
     def shares(self, engine: Engine, pin: int) -> Mapping[str, tuple[float, float]]:
         """Return the mass of each part on a crank pin [kg], and the share of it that the bob weight has (U1).

@@ -75,6 +75,7 @@ class Receiver:
     takes_frame_force: bool = False
     band: tuple[float, float] = (0.0, math.inf)
     weightings: tuple[Curve, ...] = (None, None, None)
+    powers: ClassVar = {"point": (0, 1)}
 
     def weights(self, frequencies: Array) -> ComplexArray:
         """Return the factor of each component at frequencies [Hz], shape (n, components): zero outside the band."""
@@ -111,23 +112,14 @@ class Receivers(Extra):
     receivers: tuple[Receiver, ...] = ()
     frame: Frame | None = None
 
-    def scaled(self, length: float, _: float) -> Self:
+    def scaled(self, length: float, mass: float) -> Self:
         """Return the receivers with points at scaled positions; measured functions and the frame stay."""
-        receivers = tuple(
-            receiver if receiver.point is None else replace(receiver, point=_times(receiver.point, length))
-            for receiver in self.receivers
-        )
-        return replace(self, receivers=receivers)
+        return replace(super().scaled(length, mass), frame=self.frame)
 
     @property
     def labels(self) -> Sequence[str]:
         """Return the names of the receivers."""
         return [receiver.name for receiver in self.receivers]
-
-
-def _times(point: Vector3, factor: float) -> Vector3:
-    x, y, z = point
-    return factor * x, factor * y, factor * z
 
 
 def receivers_of(engine: Engine, quantity: Quantity | None = None) -> tuple[Receiver, ...]:

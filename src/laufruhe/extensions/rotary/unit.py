@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -39,8 +39,8 @@ class RotaryUnit(SliderCrank):
     rotor_inertia: float = 0.0
     noun: ClassVar[str] = "rotor"
     has_rod: ClassVar[bool] = False
-    dimensions: ClassVar[Mapping[str, tuple[int, int]]] = {
-        **SliderCrank.dimensions, "rotor_radius": (0, 1), "rotor_width": (0, 1), "rotor_inertia": (1, 2),
+    powers: ClassVar = {
+        **SliderCrank.powers, "rotor_radius": (0, 1), "rotor_width": (0, 1), "rotor_inertia": (1, 2),
     }  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from laufruhe.machine.extra import Extra
 
@@ -25,7 +25,3 @@ class Run(Extra):
     up: float
     down: float
     point: str = ""
-
-    def scaled(self, _: float, __: float) -> Self:
-        """Return the same run: speeds and times do not scale."""
-        return self

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
@@ -33,6 +33,7 @@ class Webs:
 
     width: float
     thickness: float
+    powers: ClassVar = {"width": (0, 1), "thickness": (0, 1)}
 
     @property
     def modulus(self) -> float:
@@ -51,6 +52,7 @@ class Shank:
 
     diameter: float
     bore: float = 0.0
+    powers: ClassVar = {"diameter": (0, 1), "bore": (0, 1)}
 
     def __post_init__(self) -> None:
         _check_hollow("rod", self.diameter, self.bore)
@@ -83,6 +85,7 @@ class PistonPin:
     length: float
     in_bosses: float = 0.5
     given_span: float | None = None
+    powers: ClassVar = dict.fromkeys(("diameter", "bore", "length", "given_span"), (0, 1))
 
     def __post_init__(self) -> None:
         _check_hollow("piston pin", self.diameter, self.bore)
@@ -104,6 +107,7 @@ class Bolts:
 
     count: int
     diameter: float
+    powers: ClassVar = {"diameter": (0, 1)}
 
     @property
     def area(self) -> float:
@@ -128,6 +132,7 @@ class RunningGear(Extra):
     """
 
     name: ClassVar[str] = "size"
+    powers: ClassVar = {"density": (1, -3)}
     elastic_modulus: float = STEEL
     density: float | None = None
     webs: Webs | None = None
@@ -150,17 +155,6 @@ class RunningGear(Extra):
         return resized(
             engine, {size: value + changes.get(size, 0.0) for size, value in moving_gear(engine).sizes.items()}
         )
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the running gear of a similar engine, scaled by factors of lengths and masses."""
-        scaled_parts: dict[str, object] = {}
-        for name in PARTS:
-            part = getattr(self, name)
-            if part is not None:
-                sizes = {f.name: getattr(part, f.name) for f in fields(part) if f.name not in ("count", "in_bosses")}
-                scaled_parts[name] = replace(part, **{k: None if v is None else v * length for k, v in sizes.items()})
-        density = None if self.density is None else self.density * (mass / length**3)
-        return replace(self, density=density, **scaled_parts)  # type: ignore[arg-type]
 
     def rod_masses(self, part: SliderCrank) -> tuple[float, float, float]:
         """Return the masses that shank and piston pin add to a slider-crank (Z2).

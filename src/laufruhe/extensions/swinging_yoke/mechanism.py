@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -50,8 +50,8 @@ class SwingingYoke(SliderCrank):
     lever_weight_radius: float = 0.0
     has_pin_loads: ClassVar[bool] = False
     is_balanced_by_share: ClassVar[bool] = False
-    dimensions: ClassVar[Mapping[str, tuple[int, int]]] = {
-        **SliderCrank.dimensions, "lever_mass": (1, 0), "lever_inertia": (1, 2), "lever_weight": (1, 0),
+    powers: ClassVar = {
+        **SliderCrank.powers, "lever_mass": (1, 0), "lever_inertia": (1, 2), "lever_weight": (1, 0),
         **dict.fromkeys(("pivot", "lever_length", "ram_height", "lever_centre", "lever_weight_radius"), (0, 1)),
     }  # fmt: skip
 

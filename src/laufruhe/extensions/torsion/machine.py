@@ -25,6 +25,10 @@ STEEL = 80e9
 """Shear modulus of a shaft [Pa] where none is given."""
 
 
+# of one material, stiffness grows as the cube of length, and damping as the root of inertia times stiffness
+_DAMPING = (0.5, 2.5)
+
+
 @dataclass(frozen=True)
 class Disc:
     """Rigid disc of the torsional chain: a throw, flywheel or pulley, or a disc of a geared branch.
@@ -46,6 +50,7 @@ class Disc:
     damping: float = 0.0
     cylinders: tuple[str, ...] = ()
     ratio: float = 1.0
+    powers: ClassVar = {"inertia": (1, 2), "damping": _DAMPING}
 
     def __post_init__(self) -> None:
         if not self.inertia > 0.0:
@@ -84,6 +89,9 @@ class ShaftSection:
     bore: float = 0.0
     length: float | None = None
     shear_modulus: float = STEEL
+    powers: ClassVar = {
+        "stiffness": (0, 3), "damping": _DAMPING, **dict.fromkeys(("bore", "diameter", "length"), (0, 1))
+    }  # fmt: skip
 
     def __post_init__(self) -> None:
         if not self.stiffness > 0.0:
@@ -138,6 +146,7 @@ class Absorber:
     damping: float = 0.0
     order: float = 0.0
     damping_ratio: float = 0.0
+    powers: ClassVar = {"inertia": (1, 2), "stiffness": (0, 3), "damping": _DAMPING}
 
     def __post_init__(self) -> None:
         if not self.inertia > 0.0:
@@ -290,23 +299,6 @@ class Torsion(Extra):
     def labels(self) -> Sequence[str]:
         """Return the names of discs and sections."""
         return [*(disc.name for disc in self.discs), *(section.name for section in self.sections)]
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the chain in another size, of the same material: stiffness grows as the cube of length."""
-        inertia, stiffness = mass * length**2, length**3
-        damping = math.sqrt(inertia * stiffness)
-        discs = (replace(d, inertia=d.inertia * inertia, damping=d.damping * damping) for d in self.discs)
-        sections = (
-            replace(s, stiffness=s.stiffness * stiffness, damping=s.damping * damping, bore=s.bore * length,
-                    diameter=None if s.diameter is None else s.diameter * length,
-                    length=None if s.length is None else s.length * length)
-            for s in self.sections
-        )  # fmt: skip
-        absorbers = (
-            replace(a, inertia=a.inertia * inertia, stiffness=a.stiffness * stiffness, damping=a.damping * damping)
-            for a in self.absorbers
-        )
-        return replace(self, discs=tuple(discs), sections=tuple(sections), absorbers=tuple(absorbers))
 
 
 def stiffness_of(pieces: Sequence[tuple[float, float, float]], shear_modulus: float = STEEL) -> float:

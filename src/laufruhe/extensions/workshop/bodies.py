@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import ClassVar
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.workshop.shapes import Shape
@@ -35,6 +35,7 @@ class Body:
     thickness: float
     density: float
     spacing: float = 0.0
+    powers: ClassVar = {"thickness": (0, 1), "spacing": (0, 1), "density": (1, -3)}
 
     @property
     def per_area(self) -> float:
@@ -61,13 +62,6 @@ class Body:
         half, middles = 0.5 * self.thickness, (x - 0.5 * self.spacing, x + 0.5 * self.spacing)
         return tuple((middle - half, middle + half) for middle in dict.fromkeys(middles))
 
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the body with lengths and masses multiplied by these factors."""
-        shape, density = self.shape.scaled(length), self.density * mass / length**3
-        return replace(
-            self, shape=shape, thickness=self.thickness * length, density=density, spacing=self.spacing * length
-        )
-
 
 @dataclass(frozen=True)
 class BodyRange:
@@ -88,10 +82,6 @@ class BodyRange:
     def has_open_shape(self) -> bool:
         """True if a size apart from the thickness is open, so that the centre of mass moves."""
         return self.smallest.shape != self.largest.shape
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the range with lengths and masses multiplied by these factors."""
-        return replace(self, smallest=self.smallest.scaled(length, mass), largest=self.largest.scaled(length, mass))
 
 
 @dataclass(frozen=True)

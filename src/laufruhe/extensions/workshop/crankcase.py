@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Self
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,11 +31,7 @@ class RodSize:
     thickness: float
     big_end: float
     small_end: float = 0.0
-
-    def scaled(self, length: float) -> Self:
-        """Return the rod with lengths multiplied by this factor."""
-        return replace(self, width=self.width * length, thickness=self.thickness * length,
-                       big_end=self.big_end * length, small_end=self.small_end * length)  # fmt: skip
+    powers: ClassVar = dict.fromkeys(("width", "thickness", "big_end", "small_end"), (0, 1))
 
 
 @dataclass(frozen=True)
@@ -45,6 +41,7 @@ class Wall:
     name: str
     direction: complex
     distance: float
+    powers: ClassVar = {"distance": (0, 1)}
 
 
 @dataclass(frozen=True)
@@ -55,6 +52,7 @@ class RoundPart:
     place: complex
     radius: float
     ends: tuple[float, float] = (-math.inf, math.inf)
+    powers: ClassVar = dict.fromkeys(("place", "radius", "ends"), (0, 1))
 
 
 @dataclass(frozen=True)
@@ -76,17 +74,7 @@ class Crankcase:
     rod: RodSize | None = None
     walls: tuple[Wall, ...] = ()
     round_parts: tuple[RoundPart, ...] = ()
-
-    def scaled(self, length: float) -> Self:
-        """Return the crankcase with lengths multiplied by this factor."""
-        walls = tuple(replace(wall, distance=wall.distance * length) for wall in self.walls)
-        round_parts = tuple(
-            replace(part, place=part.place * length, radius=part.radius * length,
-                    ends=(part.ends[0] * length, part.ends[1] * length))
-            for part in self.round_parts
-        )  # fmt: skip
-        return replace(self, clearance=self.clearance * length, skirt=self.skirt and self.skirt * length,
-                       rod=self.rod and self.rod.scaled(length), walls=walls, round_parts=round_parts)  # fmt: skip
+    powers: ClassVar = {"clearance": (0, 1), "skirt": (0, 1)}
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
-from typing import ClassVar, Self
+from typing import ClassVar
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.workshop.bodies import Body, BodyFit, BodyRange
@@ -24,11 +24,6 @@ class Workshop(Extra):
     name: ClassVar[str] = "workshop"
     sizes: tuple[tuple[str, BodyRange], ...] = ()
     crankcase: Crankcase = field(default_factory=Crankcase)
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the bodies and the crankcase of a similar engine."""
-        sizes = tuple((name, one.scaled(length, mass)) for name, one in self.sizes)
-        return replace(self, sizes=sizes, crankcase=self.crankcase.scaled(length))
 
 
 @dataclass(frozen=True)

@@ -101,9 +101,10 @@ class Shape(ABC):
         changes: dict[str, Any] = sizes
         return replace(self, **changes)
 
-    def scaled(self, length: float) -> Self:
-        """Return the shape with lengths multiplied by this factor."""
-        return self.sized(**{name: size * length for name, size in self.sizes.items() if name not in self.angles})
+    @property
+    def powers(self) -> Mapping[str, tuple[int, int]]:
+        """Powers of mass and length in its sizes."""
+        return {name: (0, 1) for name in self.sizes if name not in self.angles}
 
     @property
     def sizes(self) -> Mapping[str, float]:
