@@ -130,6 +130,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "bob_weights": "balancing",
         "correction": "balancing",
         "measurements": "identification",
+        "electric_machines": "electric_torque",
     },
     "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
@@ -137,7 +138,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "drives": {"swinging-yoke": "swinging_yoke"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")
-    | {"parts price": "parts_lists"},
+    | {"parts price": "parts_lists", "electric torque": "electric_torque"},
 }
 """Extensions of this package by the names that they add to tables, for the complaint if one is not installed."""
 INSTALL = "install laufruhe with all its folders"

@@ -183,6 +183,9 @@ _EXAMPLES = {
     "m/s": ("a speed", "10 m/s"),
     "m/s^2": ("an acceleration", "10 m/s^2"),
     "s": ("a time", "60 s"),
+    "A": ("a current", "170 A"),
+    "ohm": ("a resistance", "0.02 ohm"),
+    "N m/A": ("a torque over current", "0.35 N m/A"),
     "": ("a plain number", "0.26"),
 }
 
@@ -293,6 +296,9 @@ _WRITTEN = {
     "m/s": f"(?:{_LENGTH}) ?/ ?(?:s|min|h)",
     "m/s^2": f"{_LENGTH}{_OVER}s(?:\\^|\\*\\*)?2",
     "s": "[nµum]?s|min|minutes?|h|hours?",
+    "A": "[mk]?A",
+    "ohm": "[mk]?ohm",
+    "N m/A": f"(?:[kM]?Nm|{_FORCE}{_BY}{_LENGTH}){_OVER}[mk]?A",
 }
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?"
 

@@ -42,6 +42,7 @@ PLACES = {
     "sections": "shaft section",
     "webs": "web",
     "receivers": "receiver",
+    "electric_machines": "electric machine",
 }
 SIDES = {"max": "at most", "min": "at least"}
 EDGES = (*SIDES, "outside")
@@ -70,6 +71,7 @@ class QuantityTable(Table):
         "Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ..."
     )
     receivers: list[str] | None = f.optional("Receivers that count, by name; all by default.")
+    electric_machines: list[str] | None = f.optional("Electric machines that count, by name; all by default.")
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     alternating: bool | None = f.optional(

@@ -372,7 +372,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         problem,
         objective=ranks[0].terms if ranks else (),
         ranks=ranks if len(ranks) > 1 else (),
-        limits=limits_of(file.constraints, measure_context),
+        limits=(*limits_of(file.constraints, measure_context), *problem.limits),
         friction=tuple(brake.tests if brake else ()),
     )
     return with_fidelity(problem, file.fidelity)

@@ -20,7 +20,7 @@ from laufruhe.problem.decision import Decision, PlaceDrive, RotorDrive
 from laufruhe.problem.sets import Interval, Sector, Set
 
 _HOW = {"equal": (1.0, False), "opposite": (-1.0, False), "mirrored": (1.0, True), "mirrored opposite": (-1.0, True)}
-_UNITS = {"unbalance": "kg m", "mass": "kg"}
+_UNITS = {"unbalance": "kg m", "mass": "kg", "torque": "N m"}
 
 
 EVERY = "every"
@@ -249,15 +249,15 @@ def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: 
         key, size, gain = "mass", Open.from_value(table.mass), table.radius
     angle, direction = Open.from_value(table.angle), gain * cis(as_turn(reference))
     start = size.start * cis(as_turn(angle.start))
-    allowed: Set = _sector(key, size, angle, where) if angle.is_open else Interval(*size.bounds, angle.lower)
+    allowed: Set = sector_of(key, size, angle, where) if angle.is_open else Interval(*size.bounds, angle.lower)
     into.add(replace(rotor, unbalance=direction * start), f"{where}.name")
     if size.is_open:
         drive = RotorDrive(rotor.name, direction)
         into.decisions.append(Decision(f"{rotor.name}.{key}", _UNITS[key], allowed, start, (drive,)))
 
 
-def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
-    """Return the set of allowed values of an unbalance with open size and angle.
+def sector_of(key: str, size: Open, angle: Open, where: str) -> Sector:
+    """Return the set of allowed values of an unbalance or a torque with open size and angle.
 
     Raise `Refused` if the set is not convex.
     """

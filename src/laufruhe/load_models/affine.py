@@ -7,12 +7,12 @@ once for each column, an entry of the decision vector.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.decision import Decision, Domain, Kind, column_scales, decision_vector, domains_of
+from laufruhe.problem.decision import Decision, Domain, Kind, NumberDrive, column_scales, decision_vector, domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, kinks_of, load_rows, mass_rows
@@ -231,10 +231,15 @@ class AffineModel:
         self.base = problem.engine.cycle.base_order
         if not whole_cycle:
             orders = tuple(as_order(abs(rotor.shaft.ratio)) for change in self._changes for rotor in change.rotors)
-            # loads inside the crankcase may repeat less often than the wrench on the block
+            # loads inside the crankcase may repeat less often than the wrench on the block, and machines may be still
             inside = {measure.load for measure in problem.measures if measure.is_inside}
-            signals = [loads.wrench for loads in self.bare.loads]
-            signals += [signal for channel in inside for signal in self.bare.signals(channel)]
+            machines = [
+                loads for columns in self._slopes for loads, change in zip(columns, self._changes, strict=True)
+                if change.extras
+            ]  # fmt: skip
+            counted = [*self.bare.loads, *machines]
+            signals = [loads.wrench for loads in counted]
+            signals += [channel.signal(loads) for channel in inside for loads in counted]
             self.base = common_base([signal.repeat_order(orders) for signal in signals] or [Fraction(1)])
 
     @property
@@ -341,26 +346,30 @@ class AffineModel:
 
 
 class _Change(NamedTuple):
-    # one unit of a column: rotors by their unbalance, pistons by one kilogram, geared shafts by all their inertia
+    # one unit of a column: rotors by their unbalance, pistons by one kilogram, geared shafts by all their inertia,
+    # numbers of extensions by one
     rotors: tuple[Rotor, ...]
     pistons: tuple[tuple[str, str], ...]
     shares: tuple[str, ...]
+    extras: Mapping[str, Mapping[Any, complex]]
 
 
 def _change(problem: Problem, decision: Decision, direction: complex) -> _Change:
     by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
     rotors = tuple(replace(by_name[d.rotor], unbalance=d.of(direction)) for d in decision.rotor_drives)
-    if decision.keys(Kind.PISTON) and problem.fidelity.has_uneven_speed:
-        rule = "reciprocating masses are decided for a crank that turns evenly"
-        raise ModelError(f"{rule}; leave fidelity.crank_inertia out, or fix the mass")
-    return _Change(rotors, decision.keys(Kind.PISTON), decision.keys(Kind.SHARE))
+    extras: dict[str, dict[Any, complex]] = {}
+    for drive in decision.drives:
+        if isinstance(drive, NumberDrive) and drive.kind not in (Kind.PISTON, Kind.SHARE):
+            extras.setdefault(drive.kind.name, {})[drive.key] = direction
+    return _Change(rotors, decision.keys(Kind.PISTON), decision.keys(Kind.SHARE), extras)
 
 
 def _only_changed(engine: Engine, change: _Change) -> Engine:
-    # the engine with the changed rotors and pistons as its only masses
+    # the engine with the changed rotors and pistons as its only masses, and the changed machines as its only load
     parts = (part.only({mass: 1.0 for name, mass in change.pistons if name == part.name})
              for part in engine.slider_cranks)  # fmt: skip
-    return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors, load_torque=None)
+    extras = tuple(extra.only(change.extras.get(extra.name, {})) for extra in engine.extras)
+    return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors, load_torque=None, extras=extras)
 
 
 def _loads(
@@ -373,7 +382,7 @@ def _loads(
     """
     without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
     wrench = added_rotor_loads(parts.rotors, problem.engine, point, problem.fidelity)
-    if any(part != part.only({}) for part in parts.slider_cranks):
+    if parts.is_loaded or any(part != part.only({}) for part in parts.slider_cranks):
         wrench = shaking_loads(parts, point, without_gas)
     if shares:
         geared = tuple(replace(shaft, share=1.0) for shaft in problem.engine.geared if shaft.name in shares)

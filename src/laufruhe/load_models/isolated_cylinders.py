@@ -33,7 +33,7 @@ def isolate_cylinder(engine: Engine, k: int, keep_places: bool, part: SliderCran
     """
     active = engine.slider_cranks[k] if part is None else part
     with_idle = [active if j == k else massless_copy(idle) for j, idle in enumerate(engine.slider_cranks)]
-    return replace(engine, slider_cranks=tuple(with_idle) if keep_places else (active,), rotors=(), load_torque=None)
+    return replace(engine.unloaded, slider_cranks=tuple(with_idle) if keep_places else (active,), rotors=())
 
 
 def evaluate_cylinders(
@@ -57,7 +57,7 @@ def isolate_rotors(engine: Engine, rotors: Sequence[Rotor], keep_places: bool) -
     Massless copies of the cylinders stay if `keep_places`.
     """
     parts = tuple(map(massless_copy, engine.slider_cranks)) if keep_places else ()
-    return replace(engine, slider_cranks=parts, rotors=tuple(rotors), load_torque=None)
+    return replace(engine.unloaded, slider_cranks=parts, rotors=tuple(rotors))
 
 
 def split_by_bank(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:

@@ -159,7 +159,7 @@ class ThrowWaves:
         )
         inside = any(measure.is_inside for measure in problem.measures)
         self.parts = [*self._cylinders(inside), *self._unbalances(rotor_throws, inside)]
-        rest = replace(isolate_rotors(engine, remaining, inside), load_torque=engine.load_torque)
+        rest = isolate_rotors(engine, remaining, inside).loaded_as(engine)
         self.rest = AffineModel(replace(motored(problem), engine=rest), keep_all=True)
         # unbalances on the throws turn in order 1
         loads = [measure for measure in problem.measures if measure.is_load]
@@ -168,7 +168,7 @@ class ThrowWaves:
         self.orders = np.array([[float(order) for order in wave] for wave in waves])
         self._place_of = {wave: place for place, wave in enumerate(waves)}
         self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in remaining]
-        loaded = [engine.cycle.base_order] if engine.load_torque is not None else []
+        loaded = [engine.cycle.base_order] if engine.is_loaded else []
         self.base = common_base([order for order in (*self.times, *self._turning, *loaded, Fraction(1)) if order])
         self.rest.base = self.base
 

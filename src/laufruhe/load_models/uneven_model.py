@@ -101,8 +101,8 @@ class UnevenModel:
             turns = round((part.firing_angle + part.throw - part.bank) / math.tau)
             angle = symbols.throws[layout.pins[k]] + offset - bank - math.tau * turns
             self._sources.append((cylinder, (ca.cos(bank), ca.sin(bank), 1.0)[-len(cylinder) :], angle))
-        if engine.load_torque is not None:
-            fixed = replace(isolate_rotors(engine, (), inside), load_torque=engine.load_torque)
+        if engine.is_loaded:
+            fixed = isolate_rotors(engine, (), inside).loaded_as(engine)
             self._sources.append(((evaluate(motored(problem), fixed),), (1.0,), 0.0))
         self._gas_and_inertia = sum(len(evaluations) for evaluations, _, _ in self._sources)
         for rotor in engine.rotors:

@@ -15,7 +15,7 @@ from typing import TypeVar
 from laufruhe.errors import ModelError
 from laufruhe.machine.block import Block, LoadCase
 from laufruhe.machine.chambers import GasModel
-from laufruhe.machine.extra import Extra
+from laufruhe.machine.extra import Extra, MachineTorque
 from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.load_torque import LoadTorque
@@ -148,6 +148,25 @@ class Engine:
     def with_extra(self, extra: Extra) -> Engine:
         """Return the engine with a part of an extension, which replaces a part of the same class."""
         return replace(self, extras=(*(one for one in self.extras if type(one) is not type(extra)), extra))
+
+    def torques(self, point: OperatingPoint) -> tuple[MachineTorque, ...]:
+        """Return the torques of machines of extensions at an operating point."""
+        base = self.cycle.base_order
+        return tuple(torque for one in self.extras for torque in one.torques(point.name, base))
+
+    @property
+    def unloaded(self) -> Engine:
+        """Engine without the torques of its load and of machines of extensions."""
+        return replace(self, load_torque=None, extras=tuple(one.only({}) for one in self.extras))
+
+    def loaded_as(self, other: Engine) -> Engine:
+        """Return the engine with the torques of load and machines of another engine."""
+        return replace(self, load_torque=other.load_torque, extras=other.extras)
+
+    @property
+    def is_loaded(self) -> bool:
+        """True if a load or a machine of an extension may have an alternating torque."""
+        return self.load_torque is not None or any(one.only({}) != one for one in self.extras)
 
     @property
     def shafts(self) -> tuple[Shaft, ...]:

@@ -3,10 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, ClassVar, Self
 
 from laufruhe.machine.scaling import scale_part
 from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.spectrum import Spectrum
+
+
+@dataclass(frozen=True, eq=False)
+class MachineTorque:
+    """Torque of a machine that is coupled to the crank, over the crank angle (T16).
+
+    Attributes
+    ----------
+    on_crank
+        Torque reduced to the crank, positive if it drives, shape (n,) [N m].
+    on_block
+        Roll moment on the block, shape (n,) [N m].
+    disc
+        Disc of the crankshaft on which it acts; empty for the disc of the load.
+    """
+
+    on_crank: Spectrum
+    on_block: Spectrum
+    disc: str = ""
 
 
 class Extra:
@@ -20,14 +42,14 @@ class Extra:
 
     name: ClassVar[str]
 
-    def moved(self, _: Mapping[Any, float], __: Sequence[SliderCrank], ___: Sequence[SliderCrank]) -> Self:
+    def moved(self, _: Mapping[Any, Any], __: Sequence[SliderCrank], ___: Sequence[SliderCrank]) -> Self:
         """Return the part with changes of its numbers.
 
         The second and third arguments are the slider-cranks before and after the change.
         """
         return self
 
-    def move(self, engine: Any, changes: Mapping[Any, float], before: Sequence[SliderCrank]) -> Any:
+    def move(self, engine: Any, changes: Mapping[Any, Any], before: Sequence[SliderCrank]) -> Any:
         """Return an engine in which its numbers have changed; `before` has the slider-cranks of the initial engine."""
         moved = self.moved(changes, before, engine.slider_cranks)
         return engine if moved is self else engine.with_extra(moved)
@@ -39,6 +61,14 @@ class Extra:
     def turning_inertia(self, _parts: Sequence[SliderCrank], /) -> float | None:
         """Return the inertia of all rotating parts except pistons and rods [kg m2]; None if it has none."""
         return None
+
+    def torques(self, _point: str, _base: Fraction, /) -> Sequence[MachineTorque]:
+        """Return the torques of its machines at an operating point, by its name and the lowest order of loads."""
+        return ()
+
+    def only(self, _: Mapping[Any, complex], /) -> Self:
+        """Return the part whose loads are these changes of its numbers alone."""
+        return self
 
     @property
     def labels(self) -> Sequence[str]:

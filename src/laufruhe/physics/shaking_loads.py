@@ -21,6 +21,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import forget_gas, gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
+from laufruhe.physics.load_torque import with_machines
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.rigid_body import plane_parts
 from laufruhe.physics.star_loads import order_index, star_loads
@@ -45,6 +46,7 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     gas, cycle, square = fidelity.gas_of(point), engine.cycle, point.speed**2
     total = _moving_loads(cycle, engine.slider_cranks, fidelity).mapped(lambda loads: square * loads)
     total += rotor_loads((*engine.pins, *engine.rotors), point.speed, cycle)
+    total = with_machines(total, engine, point)
     if gas is not None:
         total += fidelity.truncated(gas_loads(engine, gas, fidelity, point.fmep))
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total

@@ -14,7 +14,7 @@ from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
-from laufruhe.physics.load_torque import less_load
+from laufruhe.physics.load_torque import less_load, with_machines
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.rigid_body import ROLL
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -22,18 +22,17 @@ from laufruhe.physics.shaking_loads import shaking_loads
 
 def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> tuple[Spectrum, Spectrum | None]:
     """Return the inertia wrench per squared crank speed [N s2, N m s2], and that of gas and load [N, N m] or None."""
-    without_load = replace(engine, load_torque=None)
-    inertia = shaking_loads(without_load, replace(point, speed=1.0, gas=None), fidelity)
+    inertia = shaking_loads(engine.unloaded, replace(point, speed=1.0, gas=None), fidelity)
     gas = fidelity.gas_of(point)
-    if gas is None and (engine.load_torque is None or not engine.geared):
+    if gas is None and not engine.is_loaded:
         return inertia, None
     loads = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
     if gas is not None:
         loads = fidelity.truncated(gas_loads(engine, gas, fidelity, point.fmep))
-    if not engine.geared:
-        return inertia, loads
-    torque = less_load(loads.mapped(lambda wrench: wrench @ ROLL), engine, fidelity)
-    return inertia, loads + geared_moment(engine, torque)
+    if engine.geared:
+        torque = less_load(loads.mapped(lambda wrench: wrench @ ROLL), engine, point, fidelity)
+        loads += geared_moment(engine, torque)
+    return inertia, with_machines(loads, engine, point)
 
 
 @dataclass(frozen=True, eq=False)

@@ -100,7 +100,8 @@ def _unfired(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
     """Return the torque of gas, of pistons and rods as point masses, of the rods' inertia, and of all (T1).
 
-    Friction (L5b), the weights of moving parts (T14) and a load that is not constant (T12) come last if they count.
+    Friction (L5b), weights of moving parts (T14), a load that is not constant (T12) and machines of extensions (T16)
+    come last if they count.
     """
     total, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
     masses = crank_torque(engine, still, fidelity)
@@ -115,7 +116,10 @@ def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     if engine.gravity:
         parts["weights"] = with_gravity(zero, engine, fidelity)
     if engine.load_torque is not None:
-        parts["load"] = mean + less_load(zero, engine, fidelity).mapped(np.negative)
+        load = less_load(zero, replace(engine, extras=()), point, fidelity)
+        parts["load"] = mean + load.mapped(np.negative)
+    if machines := [torque.on_crank for torque in engine.torques(point)]:
+        parts["machines"] = sum(machines, zero)
     return parts
 
 
@@ -145,7 +149,7 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 def excess_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the torque of crank and weights less the alternating torque of the load, (n,) [N m] (T12, T14)."""
-    return with_gravity(less_load(crank_torque(engine, point, fidelity), engine, fidelity), engine, fidelity)
+    return with_gravity(less_load(crank_torque(engine, point, fidelity), engine, point, fidelity), engine, fidelity)
 
 
 def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
@@ -278,7 +282,8 @@ class Swing:
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:
     """Return work and inertia over the cycle; mounts and flywheel are not part of them, rotors by their weight only."""
     rotors = engine.rotors if engine.gravity else ()
-    bare = replace(engine, rotors=rotors, mounts=(), bearings=(), flywheel=None, extras=(), geared=())
+    loaded = tuple(extra for extra in engine.extras if extra.torques(point.name, engine.cycle.base_order))
+    bare = replace(engine, rotors=rotors, mounts=(), bearings=(), flywheel=None, extras=loaded, geared=())
     return _compute_swing(bare, point, fidelity)
 
 

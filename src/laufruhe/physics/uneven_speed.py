@@ -23,7 +23,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_factor
 from laufruhe.physics.gravity import with_gravity
-from laufruhe.physics.load_torque import less_load
+from laufruhe.physics.load_torque import less_load, machine_moment
 from laufruhe.physics.mechanism import cylinder_wrench, reduced
 from laufruhe.physics.rigid_body import ROLL, plane_wrench
 
@@ -122,7 +122,7 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
 
     Its sums are taken at sampled times: what a star cancels is zero to rounding only.
     """
-    torque = gas_torque(engine, point, fidelity)
+    torque = gas_torque(engine, point, fidelity) + machine_moment(engine, point)
 
     def wrench(motion: CrankMotion) -> Array:
         total = _rotor_loads((*engine.pins, *engine.rotors), motion)
@@ -161,7 +161,7 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
 
 def driving_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Return the torque of gas and weights less the alternating torque of the load [N m] (T12, T14)."""
-    return with_gravity(less_load(gas_torque(engine, point, fidelity), engine, fidelity), engine, fidelity)
+    return with_gravity(less_load(gas_torque(engine, point, fidelity), engine, point, fidelity), engine, fidelity)
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:

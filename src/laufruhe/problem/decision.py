@@ -39,12 +39,15 @@ class Kind:
         Name of such numbers, in the plural.
     is_alone
         True if channels of the core depend on it only where the table of dependences has an entry for it.
+    is_affine
+        True if every load is affine in such numbers.
     """
 
     rank: float
     name: str
     words: str = field(default="", compare=False)
     is_alone: bool = field(default=False, compare=False)
+    is_affine: bool = field(default=False, compare=False)
 
     UNBALANCE: ClassVar[Kind]
     """Unbalance: every load is affine in it (P1)."""
@@ -78,15 +81,15 @@ class Kind:
         return _kind_named, (self.name,)
 
 
-Kind.UNBALANCE = Kind(1, "unbalance", "unbalances")
+Kind.UNBALANCE = Kind(1, "unbalance", "unbalances", is_affine=True)
 Kind.PLACE = Kind(2, "place", "places of shafts")
 Kind.STIFFNESS = Kind(3, "stiffness", "stiffness")
 Kind.MOUNT = Kind(4, "mount", "other numbers of mounts")
 Kind.STAR = Kind(5, "star", "stars, firing orders, shafts")
 Kind.FLYWHEEL = Kind(6, "flywheel", "flywheel", is_alone=True)
-Kind.PISTON = Kind(7, "piston", "masses of pistons")
+Kind.PISTON = Kind(7, "piston", "masses of pistons", is_affine=True)
 Kind.SIZE = Kind(9, "size", "sizes")
-Kind.SHARE = Kind(10, "share", "shares of geared inertia")
+Kind.SHARE = Kind(10, "share", "shares of geared inertia", is_affine=True)
 Kind.LEAD = Kind(11, "lead", "leads")
 Kind.NUMBER = Kind(12, "number", "other numbers of the file")
 
@@ -334,7 +337,7 @@ class Decision:
     @property
     def is_affine(self) -> bool:
         """True if every load is affine in it."""
-        return self.kind in (Kind.UNBALANCE, Kind.PISTON, Kind.SHARE)
+        return self.kind.is_affine
 
     @property
     def is_stiffness(self) -> bool:

@@ -159,8 +159,10 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     if kind is Kind.LEAD and entry in (Dependence.SHIFT, Dependence.SWING) and shares_gas(problem):
         # a lead changes the volume between two pistons with common gas
         return Dependence.SMOOTH
-    if problem.fidelity.has_uneven_speed and entry in _OF_EVEN_SPEED and kind is not Kind.STAR:
-        return Dependence.SMOOTH
+    if problem.fidelity.has_uneven_speed and kind is not Kind.STAR:
+        moves_crank = channel.is_load and TABLE[STORED_WORK.name].get(kind) is Dependence.AFFINE
+        if entry in _OF_EVEN_SPEED or moves_crank:
+            return Dependence.SMOOTH
     return entry
 
 
@@ -194,8 +196,8 @@ def keeps_omitted(channel: Channel, kinds: Collection[Kind], problem: Problem) -
 
 def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
     """Return True if a channel is an affine function of all decisions of these kinds together, or constant."""
-    if {Kind.SHARE, Kind.PISTON} <= set(kinds):
-        # the inertia on a geared shaft is a fraction of one that depends on the pistons
+    if Kind.SHARE in kinds and depends(STORED_WORK, kinds, problem):
+        # the inertia on a geared shaft takes a fraction of a torque that depends on the other kinds
         return not depends(channel, kinds, problem)
     allowed = (Dependence.NONE, Dependence.AFFINE)
     return all(dependence(channel, kind, problem) in allowed for kind in kinds)

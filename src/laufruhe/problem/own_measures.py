@@ -220,5 +220,5 @@ def _random_values(problem: Problem, random: np.random.Generator) -> list[Value]
     for decision in problem.decisions:
         size = random.uniform(decision.lower, decision.upper)
         angle = random.uniform(*decision.set.angles)
-        values.append(size * complex(math.cos(angle), math.sin(angle)) if decision.rotor_drives else size)
+        values.append(size * complex(math.cos(angle), math.sin(angle)) if decision.is_affine else size)
     return values

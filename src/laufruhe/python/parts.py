@@ -208,6 +208,15 @@ class EngineParts(Parts):
         """Return the engine with correction. Holes and slugs that correct the unbalance of a rotor in two planes."""
         return self._with("correction", "correction", keys_of(locals()))
 
+    def electric_machine(
+        self, name: str, *, shaft: str | None = None, stator: Literal["block", "ground"] | None = None,
+        disc: str | None = None, mean_torque: Value | None = None, orders: Values | None = None,
+        harmonics: Sequence[Table] | None = None, max_torque: Value | None = None, torque_constant: Value | None = None,
+        max_current: Value | None = None, resistance: Value | None = None, max_loss: Value | None = None,
+    ) -> Self:
+        """Return the engine with an electric machine. A motor or generator whose torque follows the crank angle."""
+        return self._with("electric_machines", "electric_machine", keys_of(locals()))
+
     def measurement(
         self, *, file: str, quantity: str | None = None, unit: str | None = None,
         amplitude: Literal["peak", "rms"] | None = None, deviation: Number | None = None, values: Table | None = None,

@@ -135,6 +135,11 @@ def frame_spring(
     return keys_of(locals())
 
 
+def harmonic(*, order: Number, torque: Value, angle: Value | None = None, operating_point: str | None = None) -> Table:
+    """Return a table `harmonic`. Torque of one order of the crank."""
+    return keys_of(locals())
+
+
 def intervals(
     *, min: Number | None = None, max: Number | None = None, largest_deviation: Number | None = None,
 ) -> Table:
@@ -289,8 +294,9 @@ def stop(*, gap: Value, stiffness: Value) -> Table:
 def term(
     *, quantity: QuantityName, mounts: Sequence[str] | None = None, bearings: Sequence[str] | None = None,
     cylinders: Sequence[str] | None = None, sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
-    receivers: Sequence[str] | None = None, operating_points: Sequence[str] | None = None, orders: Values | None = None,
-    alternating: bool | None = None, direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+    receivers: Sequence[str] | None = None, electric_machines: Sequence[str] | None = None,
+    operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
+    direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
     motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
     wanted: Number | None = None, frequency: Value | None = None, weight: Number | None = None,
 ) -> Table:

@@ -239,8 +239,8 @@ def _one_by_one(problem: Problem, values: ComplexArray) -> list[_Answer]:
 
 
 def numbers_of(decisions: Sequence[Decision], values: ComplexArray) -> list[Value]:
-    """Return the values of decisions from complex numbers, shape (decisions,); only unbalances stay complex."""
+    """Return the values of decisions from complex numbers, shape (decisions,); affine ones stay complex."""
     return [
-        complex(value) if decision.rotor_drives else float(value.real)
+        complex(value) if decision.is_affine else float(value.real)
         for decision, value in zip(decisions, values, strict=True)
     ]

@@ -164,9 +164,9 @@ def estimate(measurements: Sequence[Measurement], say: Callable[[str], None] = l
 
 
 def value_of(domain: Domain, x: Array) -> Value:
-    """Return the value of a number from all columns; real, unless it is an unbalance."""
+    """Return the value of a number from all columns; real, unless all loads are affine in it."""
     value = domain.complex_value(x)
-    return value if domain.decision.rotor_drives else value.real
+    return value if domain.decision.is_affine else value.real
 
 
 def stacked(parts: Sequence[ComplexArray]) -> Array:

@@ -209,6 +209,6 @@ def problem_of_shafts(problem: Problem, is_included: Callable[[str], bool]) -> P
         replace(d, drives=tuple(v if v.rotor in included else replace(v, gain=0.0) for v in d.rotor_drives))
         for d in problem.unbalances
     ]
-    load = engine.load_torque if is_included(CRANKSHAFT.name) else None
-    reduced = replace(engine, slider_cranks=parts, rotors=rotors, load_torque=load)
+    loaded = engine if is_included(CRANKSHAFT.name) else engine.unloaded
+    reduced = replace(loaded, slider_cranks=parts, rotors=rotors)
     return replace(problem, engine=reduced, decisions=tuple(decisions))

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -29,7 +28,6 @@ FEW_ANGLES = 48
 """Number of samples over the period of the loads, if the problem uses more."""
 TIMES = 2
 """Samples at which an optimum is evaluated, over samples of its program."""
-_FOLLOWED = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +62,7 @@ def can_follow(problem: Problem) -> bool:
     measures = [measure for measure in problem.measures if not measure.channel.simulation]
     affine = all(is_affine(measure.channel, kinds, problem) for measure in measures)
     convex = all(measure.norm.is_convex for measure in problem.measures if measure.is_load)
-    return bool(kinds) and kinds <= _FOLLOWED and has_norm and has_no_extras and affine and convex
+    return bool(kinds) and all(kind.is_affine for kind in kinds) and has_norm and has_no_extras and affine and convex
 
 
 class Follower:

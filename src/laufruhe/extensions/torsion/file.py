@@ -332,6 +332,7 @@ def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]
 def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> Problem:
     """Return the problem with the torsional chain of [torsion]; refuse an inertia that contradicts the discs (V14)."""
     chain, decisions = _chain(table, problem.engine.slider_cranks, context.throws)
+    _check_machines(problem, chain)
     wheel = problem.engine.flywheel
     result = replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))
     if wheel is None:
@@ -357,6 +358,13 @@ def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> P
         )
         raise Refused(where, units.quantity_text(inertia, "kg m^2"), rule, remedy)
     return result
+
+
+def _check_machines(problem: Problem, chain: Torsion) -> None:
+    names = [disc.name for disc in chain.discs]
+    for torque in (torque for point in problem.points for torque in problem.engine.torques(point)):
+        if torque.disc not in ("", *names):
+            raise Refused("electric_machines", torque.disc, "is no disc of [torsion]", nearest(torque.disc, names))
 
 
 def _numbers(table: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:

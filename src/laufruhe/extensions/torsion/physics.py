@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -27,7 +27,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.exact_angles import as_turn, phasors
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.load_torque import less_load
+from laufruhe.physics.load_torque import load_torques
 from laufruhe.physics.torque import cylinder_torque
 
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
@@ -200,7 +200,7 @@ def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
 
 
 def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the torque of gas, pistons, rods and load on every disc, shape (n, discs) [N m] (T1, T12).
+    """Return the torque of gas, pistons, rods, load and machines on every disc, (n, discs) [N m] (T1, T12, T16).
 
     The load acts at crank speed, on the disc where the driven machine takes its torque.
 
@@ -216,11 +216,11 @@ def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     chain = chain_of(engine)
     driven = tuple(disc.cylinders for disc in chain.discs)
     torques = _throw_torques(engine.cycle, engine.slider_cranks, driven, point, fidelity)
-    if engine.load_torque is None:
-        return torques
-    zero = Spectrum(torques.base, np.zeros(1, dtype=complex))
-    at_output = np.arange(len(driven)) == chain.driven
-    return torques + less_load(zero, engine, fidelity).mapped(lambda values: values[:, None] * at_output)
+    at = {"": np.eye(len(driven))[chain.driven]}
+    at |= {disc.name: row for disc, row in zip(chain.discs, np.eye(len(driven)), strict=True)}
+    for name, torque in load_torques(engine, point, fidelity):
+        torques += torque.mapped(lambda values: values[:, None]).mapped(partial(np.multiply, at[name]))
+    return torques
 
 
 @lru_cache(maxsize=64)

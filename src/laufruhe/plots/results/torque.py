@@ -15,6 +15,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.torque import TorqueFacts, excess_torque, swing_of, torque_facts, torque_parts, turning_inertia
 from laufruhe.plots.style import (
+    BLUE,
     GREEN,
     INDIGO,
     ORANGE,
@@ -39,6 +40,7 @@ STEPS, MAX_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
 COLOURS = {
     "gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK, "load": PURPLE, "weights": VERMILION, "friction": INDIGO,
+    "machines": BLUE,
 }  # fmt: skip
 # smallest drawn part, and smallest drawn order, relative to the largest
 MIN_PART, MIN_ORDER = 1e-3, 1e-2

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 NAMED = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.values() if channel.simulation)}
 """Channels that have formulas over boxes of mounts."""
-_AFFINE = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 
 def named_part(problem: Problem) -> Problem:
@@ -35,7 +33,7 @@ def is_named(measure: Measure, problem: Problem) -> bool:
         return False
     for kind in {decision.kind for decision in problem.decisions}:
         depends = dependence(measure.channel, kind, problem)
-        affine = kind in _AFFINE and depends is Dependence.AFFINE
+        affine = kind.is_affine and depends is Dependence.AFFINE
         has_formula = measure.channel in NAMED and depends is not Dependence.UNKNOWN
         if not (depends is Dependence.NONE or affine or has_formula):
             return False
