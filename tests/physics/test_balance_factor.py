@@ -46,11 +46,8 @@ def test_a_workshop_counts_the_same() -> None:
     assert [one.factor for one in found] == pytest.approx([(65.0 - 18.0) / 27.0], rel=1e-12)
 
 
-def test_a_weight_of_nothing_is_none_unless_asked_for() -> None:
-    idle = engine(SINGLE, 'name = "web"\nopposite_throw = 1\nunbalance = "0 kg m"')
-    assert balance_factors(idle) == ()
-    # all that turns with the pin is left: 0.4 kg beside 0.6 kg
-    assert balance_factors(idle, and_of_none=True)[0].factor == pytest.approx(-0.4 / 0.6)
+def test_a_weight_of_nothing_is_none() -> None:
+    assert balance_factors(engine(SINGLE, 'name = "web"\nopposite_throw = 1\nunbalance = "0 kg m"')) == ()
 
 
 def test_only_what_stands_opposite_counts() -> None:

@@ -188,9 +188,9 @@ def test_weights_are_in_grams_and_throws_have_their_balance_factor() -> None:
     made = dict(zip(weights.head, weights.rows[0], strict=True))
     assert float(made["final unbalance [g mm]"]) == pytest.approx(1e6 * float(made["final unbalance [kg m]"]), rel=1e-3)
     assert [row[-1] for row in tables["Balance factors"].rows] == ["100.0 %"]
-    # a factor of nothing on a throw without rotating mass is a weight of nothing, and still a factor
+    # a factor of nothing on a throw without rotating mass is no weight
     plain = {grid.title: grid for grid in tables_of(laufruhe.solve(_OPEN_FACTOR))}
-    assert [tuple(row) for row in plain["Balance factors"].rows] == [("cylinder 1", "0 %", "50.0 %")]
+    assert [tuple(row) for row in plain["Balance factors"].rows] == [("cylinder 1", "no weight", "50.0 %")]
     tight = {grid.title: grid for grid in tables_of(scenes.solved(scenes.TIGHT))}
     assert re.fullmatch(r"[\d.]+ kg m = [\d.]+ g mm", tight["Decisions"].rows[0][2])
 

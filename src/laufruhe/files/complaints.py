@@ -62,6 +62,14 @@ def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Compl
     details = [(*_walk(detail["loc"], model), detail) for detail in errors]
     unknown = [loc for loc, _, detail in details if detail["type"] == "extra_forbidden"]
     for loc, tables, detail in details:
+        if detail["type"] == "list_type" and isinstance(loc[-1], int):
+            entries = [(one[-1], entry["input"]) for one, _, entry in details if one[:-1] == loc[:-1]]
+            if [k for k, _ in entries] == [*range(least_length(model, loc))]:
+                # a single pair, without the brackets of the list of pairs
+                flat, where = [value for _, value in entries], key_path(loc[:-1])
+                example = f"write for example {toml_value([flat])}"
+                complaints.setdefault(where, Complaint(where, value_text(flat), "must be a list of lists", example))
+                continue
         # a missing key may be present in another spelling, which is a complaint of its own
         words = [str(loc_unknown[-1]) for loc_unknown in unknown if loc_unknown[:-1] == loc[:-1]]
         words += [key for word in words for key, _ in meanings(word)]

@@ -21,10 +21,10 @@ class BalanceFactor:
     factor: float
 
 
-def balance_factors(engine: Engine, and_of_none: bool = False) -> tuple[BalanceFactor, ...]:
+def balance_factors(engine: Engine) -> tuple[BalanceFactor, ...]:
     """Return the factors of throws with a counterweight; each weight counts for the nearest throws of its shaft (L9).
 
-    A weight of nothing counts as none, unless `and_of_none`.
+    A weight of nothing counts as none.
 
     kappa = (-Re sum U e^{-i theta} - m_rot r) / (m_rec r), with the unbalances U [kg m] of the counterweights of a
     throw at theta, its rotating mass m_rot [kg] and reciprocating mass m_rec [kg] at the crank radius r [m].
@@ -47,7 +47,7 @@ def balance_factors(engine: Engine, and_of_none: bool = False) -> tuple[BalanceF
             for j in near.tolist():
                 along = (rotor.unbalance * np.conj(cis(as_turn(throws[j][0].throw)))).real
                 opposite[j] -= along / len(near)
-                counted[j] |= rotor in weights and (and_of_none or rotor.unbalance != 0.0)
+                counted[j] |= rotor in weights and rotor.unbalance != 0.0
         for k, throw in enumerate(throws):
             unbalance = sum(part.reciprocating_mass * part.crank_radius for part in throw)
             if counted[k] and unbalance > 0.0:

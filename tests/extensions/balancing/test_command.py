@@ -134,6 +134,7 @@ PLANE = "correction.planes[1]"
         ('unbalance = "400 g mm", ', "", f"{PLANE}.measured.unbalance: is missing; give unbalance or mass and radius"),
         ("places = 12", "", f"{PLANE}.angles: is missing; give angles or places"),
         ("places = 12", "angles = [10, 370]", "two places are at this angle"),
+        ("places = 12", "places = 12\nsolid = [-30, 30]", "must be a list of lists; write for example [[-30, 30]]"),
         ("places = 12", "places = 12\nsolid = [[0, 360]]", f"{PLANE}.allowed: and solid leave no place"),
         ('"right"', '"left"', "two planes have this name"),
         ('"20 g mm"', '"G 6.3"', "correction.rotor_mass: is missing, and a balance grade needs it"),

@@ -120,22 +120,52 @@ def test_a_larger_max_depth_never_leaves_more(seed: int) -> None:
             assert other.bound <= count.value
 
 
-def test_each_hole_keeps_its_wall_along_its_own_depth() -> None:
-    """A crank cheek of 62 mm: 8 mm wide and 20 mm deep at 40 deg, beside a pin of 30 deg, leaves 3.70 g cm of 42."""
-    tables: Tables = {
+def cheek(direction: str, unbalance: str) -> Tables:
+    """A crank cheek of 62 mm, its heavy spot 5 deg beside the solid sector of the pin."""
+    return {
         "title": "Cheek",
         "correction": {
-            "density": "7850 kg/m^3", "drills": ["8 mm", "10 mm", "12 mm", "14 mm", "16 mm"], "direction": "radial",
+            "density": "7850 kg/m^3", "drills": ["8 mm", "10 mm", "12 mm", "14 mm", "16 mm"], "direction": direction,
             "point_angle": 118, "depth_step": "1 mm", "min_depth": "3 mm", "max_depth": "25 mm", "wall": "3 mm",
-            "max_holes": 1, "permitted_unbalance": "120.3 g mm",
+            "max_holes": 2, "permitted_unbalance": "120.3 g mm",
             "planes": [
-                {"name": name, "measured": {"unbalance": "42 g cm", "angle": 35}, "radius": "62 mm", "places": 36,
+                {"name": name, "measured": {"unbalance": unbalance, "angle": 35}, "radius": "62 mm", "places": 36,
                  "solid": [[-30, 30]]}
                 for name in ("front", "rear")
             ],
         },
     }  # fmt: skip
-    assert 1e5 * abs(answer(tables).planes[0].residual) < 3.70
+
+
+def test_each_hole_keeps_its_wall_along_its_own_depth() -> None:
+    """A hole of 8 mm, 20 mm deep at 40 deg, is 3 mm from the pin and leaves 3.70 g cm of 42."""
+    plane = answer(cheek("radial", "42 g cm")).planes[0]
+    assert len(plane.design) == 1
+    assert 1e5 * abs(plane.residual) < 3.70
+
+
+def test_no_hole_stands_opposite_to_another_for_a_residual_far_below_the_permitted_one() -> None:
+    plane = answer(cheek("axial", "180 g cm")).planes[0]
+    assert plane.is_fewest
+    assert len(plane.design) == 2
+    assert plane.is_met
+    # the least residual, 0.30 g cm, takes 222 g cm away with holes at 40 and 260 deg
+    assert 1e5 * sum(abs(plane.plane.holes[place][hole].change) for place, hole in plane.design) < 195.0
+    assert plane.counts[2].value < abs(plane.residual)
+    assert not plane.is_least
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_fewest_holes_never_waste_more_than_the_least_residual(seed: int) -> None:
+    tables = random_file(seed)
+    tables["correction"]["goal"] = "fewest holes"
+    for plane in answer(tables).planes:
+        least = plane.counts[plane.best].design
+        assert least is not None
+        assert plane.plane.score(plane.design, search.WASTE) <= plane.plane.score(least, search.WASTE)
+        assert not holes_clash(plane.plane, plane.design)
+        assert len(plane.design) == len(least)
+        assert plane.is_met or plane.design == least
 
 
 def test_zero_mark_and_sense_change_readings_only() -> None:

@@ -96,7 +96,8 @@ class CorrectionTable(Table):
     closed: ClassVar[str] = "is given, and the holes are decided"
 
     goal: Literal["fewest holes", "least residual"] = f.optional(
-        "Fewest holes that leave a permitted residual, or the least residual of all designs.", "fewest holes"
+        "Fewest holes that leave a permitted residual, or the least residual of all designs.",
+        "fewest holes",
     )
     planes: f.Pair[PlaneTable] = f.required("The two correction planes.")
     density: f.Density = f.required("Density of the rotor.")
@@ -109,7 +110,9 @@ class CorrectionTable(Table):
     )
     depth_step: f.PositiveLength = f.required("Holes are whole multiples of it deep, to the end of the full diameter.")
     min_depth: f.NonNegativeLength = f.optional("Least depth of a hole.", 0.0)
-    max_depth: f.PositiveLength = f.required("Largest depth of a hole.")
+    max_depth: f.PositiveLength = f.required(
+        "Largest depth of a hole, to the end of the full diameter; the drill's point goes deeper."
+    )
     wall: f.NonNegativeLength = f.optional("Least material between two holes, and to the edge of a sector.", 0.0)
     max_holes: int = Field(default=4, ge=1, le=MAX_HOLES, description="Largest number of holes in a plane.")
     slugs: SlugsTable | None = None

@@ -41,6 +41,10 @@ class Drilling:
         """Return the height of the cone that the drill's point leaves [m] (U2)."""
         return 0.5 * diameter / math.tan(0.5 * self.point_angle)
 
+    def tip(self, diameter: float, depth: float) -> float:
+        """Return the depth to the tip of the drill's point [m]."""
+        return depth + self.point_height(diameter)
+
     def hole(self, diameter: float, depth: float, radius: float, filled: bool = False) -> Hole:
         """Return a hole; `radius` is that of the axis of an axial hole, or of the surface at a radial one [m]."""
         # a round end covers a drill's point that is not longer than the radius of the hole
@@ -150,6 +154,10 @@ class Plane:
     def residual(self, design: Design) -> complex:
         """Return the unbalance after correction [kg m] (U4)."""
         return self.initial + sum(complex(self.changes[place][hole]) for place, hole in design)
+
+    def score(self, design: Design, waste: float) -> float:
+        """Return the residual plus a share `waste` of the sum of all changes [kg m]."""
+        return abs(self.residual(design)) + waste * sum(abs(self.holes[place][hole].change) for place, hole in design)
 
     def clashes(self, place: int, other: int) -> Mask:
         """Return which holes of two places leave too little material between them, shape (holes, holes) (U5)."""

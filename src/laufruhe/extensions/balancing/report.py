@@ -15,7 +15,7 @@ from laufruhe.errors import counted
 from laufruhe.extensions.balancing.bob_weights import CARD, BobWeights, card, record
 from laufruhe.extensions.balancing.file import Correction, Job, load_job
 from laufruhe.extensions.balancing.physics import Drilling, Hole, Plane
-from laufruhe.extensions.balancing.search import PlaneResult, correct
+from laufruhe.extensions.balancing.search import WASTE, PlaneResult, correct
 from laufruhe.files.reader import display_path
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.picture import save_picture
@@ -41,6 +41,11 @@ NAMES = (
 )
 CAPTION = "The two planes to scale, seen from the front, with the holes."
 _COLOURS = {"hole": "sky", "slug": "orange"}
+_THRIFT = (
+    f" Of the designs with the fewest holes and a permitted residual, exchanges of holes looked for the least sum of "
+    f"residual and {trimmed(100.0 * WASTE)} % of the unbalance of all holes, so no hole is opposite to another for a "
+    "residual far below the permitted one (not proven)."
+)
 GRAM_MM = 1e6
 """Factor from kg m to g mm."""
 
@@ -83,7 +88,8 @@ def balanced(
         if answer is not None:
             write_csv(_numbers(answer), stage / f"{HOLES}.csv")
             say("drawing")
-            pictures[PICTURE] = save_picture(picture(job, answer), stage / PICTURE, kinds)
+            with shown_in(job.units):
+                pictures[PICTURE] = save_picture(picture(job, answer), stage / PICTURE, kinds)
         if (sheet := _card(job)) is not None:
             write_csv(sheet, stage / f"{CARD}.csv")
         with shown_in(job.units):
@@ -153,6 +159,7 @@ def _proof(answer: Balanced) -> str:
     return (
         "Every set of places has a lower bound of its residual; sets that may hold a better design are enumerated. "
         f"A residual counts as least if no other is better by {gap} % of the {what}."
+        f"{_THRIFT * correction.is_fewest}"
     )
 
 
@@ -160,21 +167,23 @@ def _hole_table(answer: Balanced) -> Table:
     drilling, dial = answer.correction.drilling, answer.correction.dial
     (length, millimetres), (mass, grams), (unbalance, size) = _units()
     rows = [
-        (f"{k}", plane.name, _kind(hole), trimmed(millimetres * hole.diameter), trimmed(millimetres * hole.depth),
+        (f"{k}", plane.name, _kind(hole), *(trimmed(millimetres * size) for size in (hole.diameter, hole.depth)),
+         number(millimetres * drilling.tip(hole.diameter, hole.depth)), trimmed(millimetres * plane.radius),
          fixed(math.degrees(dial.reading(angle)), 1), fixed(math.degrees(angle) % 360.0, 1),
          _signed(grams * drilling.mass(hole.diameter, hole.depth, hole.filled)), _signed(size * hole.change))
         for k, (plane, angle, hole) in enumerate(answer.holes, 1)
     ]  # fmt: skip
-    head = ("hole", "plane", "kind", f"diameter [{length}]", f"depth [{length}]", "angle at the machine [deg]",
+    head = ("hole", "plane", "kind", f"diameter [{length}]", f"depth [{length}]",
+            f"depth to the tip [{length}]", f"radius [{length}]", "angle at the machine [deg]",
             "angle on the crank [deg]", f"mass [{mass}]", f"unbalance [{unbalance}]")  # fmt: skip
-    way = "towards the axis" if drilling.is_radial else "along the axis"
+    way = "towards the axis, from the surface at the radius" if drilling.is_radial else "along the axis, at the radius"
     sense = "with" if dial.sense > 0.0 else "against"
     zero = fixed(math.degrees(dial.zero) % 360.0, 1)
-    point = f" The drill's point of {fixed(math.degrees(drilling.point_angle), 0)} deg goes deeper." * (
+    point = f" The drill's point has {fixed(math.degrees(drilling.point_angle), 0)} deg." * (
         drilling.point_angle < math.pi
     )
     note = (
-        f"Holes {way}. Depth to the end of the full diameter.{point} "
+        f"Holes {way}. Depth, like max_depth, to the end of the full diameter.{point} "
         f"The machine counts {sense} the rotation from the zero mark, at {zero} deg on the crank."
     )
     return Table(head, rows, title="Holes", left=(1, 2), note=note)
@@ -195,11 +204,13 @@ def _kind(hole: Hole) -> str:
 
 def _numbers(answer: Balanced) -> Table:
     head = ("hole", "plane", "kind", "diameter [mm]", "depth [mm]", "angle at the machine [deg]",
-            "angle on the crank [deg]", "radius [mm]", "mass [g]", "unbalance [g mm]")  # fmt: skip
+            "angle on the crank [deg]", "radius [mm]", "mass [g]", "unbalance [g mm]",
+            "depth to the tip [mm]")  # fmt: skip
     rows = [
         [k, entry["plane"], entry["kind"], _decimal(1e3 * entry["diameter"]), _decimal(1e3 * entry["depth"]),
          *(_decimal(math.degrees(entry[key])) for key in ("machine_angle", "crank_angle")),
-         _decimal(1e3 * entry["radius"]), 1e3 * entry["mass"], GRAM_MM * entry["unbalance"]]
+         _decimal(1e3 * entry["radius"]), 1e3 * entry["mass"], GRAM_MM * entry["unbalance"],
+         _decimal(1e3 * entry["tip_depth"])]
         for k, entry in enumerate(_hole_records(answer), 1)
     ]  # fmt: skip
     return Table(head, rows)
@@ -214,7 +225,8 @@ def _hole_records(answer: Balanced) -> list[dict[str, Any]]:
     drilling, dial = answer.correction.drilling, answer.correction.dial
     return [
         {"plane": plane.name, "kind": _kind(hole), "diameter": hole.diameter, "depth": hole.depth,
-         "machine_angle": dial.reading(angle), "crank_angle": angle % math.tau, "radius": plane.radius,
+         "tip_depth": drilling.tip(hole.diameter, hole.depth), "machine_angle": dial.reading(angle),
+         "crank_angle": angle % math.tau, "radius": plane.radius,
          "mass": drilling.mass(hole.diameter, hole.depth, hole.filled), "unbalance": hole.change}
         for plane, angle, hole in answer.holes
     ]  # fmt: skip
@@ -311,7 +323,8 @@ def picture(job: Job, answer: Balanced) -> Picture:
         legend.append(Line(colour="ink", label="sector without holes", width=3.0))
     kinds = {_kind(hole) for _, _, hole in answer.holes}
     legend += [Area(colour=_COLOURS[kind], label=kind) for kind in _COLOURS if kind in kinds]
-    view = "Seen from the front, where the crank turns clockwise; numbers are those of the list of holes."
+    view = "Both planes as seen from the front, where the crank turns clockwise; from the rear they are mirrored. "
+    view += "The list has diameter, depth, and angle at the machine."
     words = f"{headline(answer)} {view}"
     source = f"{job.source}. " if job.source else ""
     return Picture(job.title, words, panels, f"{source}Computed with Laufruhe.", (4.0, 4.0), 2, 0.8, legend)
@@ -332,6 +345,14 @@ def _panel(
         marks += _hole_marks(angle, hole, radius, correction.drilling)
         place = (radius + 0.5e3 * hole.diameter + 0.05 * reach) * _unit(np.array([angle]))[0]
         marks.append(Words(place[0], place[1], f"{k}", across="center"))
+    (length, millimetres), _, (unbalance, size) = _units()
+    texts = [
+        f"{k}: ⌀{trimmed(millimetres * hole.diameter)} × {trimmed(millimetres * hole.depth)} {length} at "
+        f"{fixed(math.degrees(correction.dial.reading(angle)), 1)}°"
+        for k, (angle, hole) in enumerate(holes, first)
+    ]
+    for side, column, across in ((-0.95, texts[:4], "left"), (0.95, texts[4:], "right")):
+        marks.append(Words(side * reach, -0.95 * reach, "\n".join(column), across=across, along="bottom"))
     if plane.initial:
         spot = _unit(np.array([float(np.angle(plane.initial))]))[0]
         marks.append(_line(np.array([0.0 * spot, 0.8 * radius * spot]), "vermilion", 2.0))
@@ -342,8 +363,8 @@ def _panel(
         marks.append(_line(ends[:2], "faint", 1.2))
         across = "center" if abs(ends[2, 0]) < 0.05 * reach else "left" if ends[2, 0] > 0.0 else "right"
         marks.append(Words(ends[2, 0], ends[2, 1], text, "faint", across, "bottom" if ends[2, 1] > 0.0 else "top"))
-    residual, before = (number(GRAM_MM * abs(one), 3) for one in (result.residual, plane.initial))
-    title = f"{plane.name}: {before} g mm before, {residual} g mm after"
+    residual, before = (number(size * abs(one), 3) for one in (result.residual, plane.initial))
+    title = f"{plane.name}, seen from the front\n{before} {unbalance} before, {residual} {unbalance} after"
     axis = Axis("mm", (-reach, reach))
     return Panel(marks, axis, axis, title)
 

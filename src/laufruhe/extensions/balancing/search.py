@@ -21,6 +21,8 @@ from laufruhe.prove.witness import Witness
 Places: TypeAlias = tuple[int, ...]
 DIRECTIONS = np.exp(2j * math.pi * np.arange(64) / 64)
 """Directions along which the reach of a set of places is measured."""
+WASTE = 0.1
+"""Residual that counts as much as a unit of unbalance that holes change, if the residual is permitted."""
 ROUNDING = 1e-13
 """Rounding error of a residual, relative to the sum of all changes."""
 MAX_SWEEPS = 20
@@ -57,17 +59,15 @@ class PlaneResult:
     counts
         Least residuals with 0, 1, 2 ... holes.
     best
-        Index in `counts` of the selected design.
+        Number of holes of the selected design.
+    design
+        Holes of the selected design.
     """
 
     plane: Plane
     counts: tuple[Count, ...]
     best: int
-
-    @property
-    def design(self) -> Design:
-        """Holes of the selected design."""
-        return self.counts[self.best].design or ()
+    design: Design
 
     @property
     def residual(self) -> complex:
@@ -89,13 +89,14 @@ class PlaneResult:
     @property
     def is_least(self) -> bool:
         """True if no design of the numbers of holes in `counts` is better than the selected one by the gap."""
-        return all(count.proven or count.bound >= self.counts[self.best].value for count in self.counts)
+        value = self.counts[self.best].value
+        return abs(self.residual) <= value and all(count.proven or count.bound >= value for count in self.counts)
 
 
 def correct(plane: Plane, max_holes: int, is_fewest: bool, gap: float) -> PlaneResult:
     """Return the fewest holes that leave a permitted residual, or the least residual of at most `max_holes` holes.
 
-    Of all designs with the fewest holes the one with the least residual is selected.
+    Of the designs with the fewest holes, exchanges of holes look for the one that wastes least.
 
     Parameters
     ----------
@@ -122,7 +123,11 @@ def correct(plane: Plane, max_holes: int, is_fewest: bool, gap: float) -> PlaneR
     met = [k for k, value in enumerate(values) if is_fewest and permitted is not None and value <= permitted]
     # fewer holes are preferred to a residual that is better by less than the gap
     best = (met or [k for k, value in enumerate(values) if value <= min(values) + gap])[0]
-    return PlaneResult(plane, tuple(counts), best)
+    design = counts[best].design or ()
+    thrifty = propose(plane, best, (), WASTE) if met else None
+    if thrifty and permitted is not None and abs(plane.residual(thrifty)) <= permitted:
+        design = min(design, thrifty, key=lambda one: plane.score(one, WASTE))
+    return PlaneResult(plane, tuple(counts), best, design)
 
 
 def least_residual(plane: Plane, holes: int, gap: float, start: Design | None = ()) -> Count:
@@ -141,31 +146,31 @@ def least_residual(plane: Plane, holes: int, gap: float, start: Design | None = 
     return Count(search.design, search.value, bound, is_proven)
 
 
-def propose(plane: Plane, holes: int, start: Design | None = ()) -> Design | None:
-    """Return a good design with so many holes, by exchanges of single holes; None if none was found."""
+def propose(plane: Plane, holes: int, start: Design | None = (), waste: float = 0.0) -> Design | None:
+    """Return a design of low score with so many holes, by exchanges of single holes; None if none was found."""
     if start is None or len(start) > holes:
         return None
     design = start
     while len(design) < holes:
-        if (longer := _with_best_hole(plane, design)) is None:
+        if (longer := _with_best_hole(plane, design, waste)) is None:
             return None
         design = longer
     for _ in range(MAX_SWEEPS):
         before = design
         for entry in before:
-            exchanged = _with_best_hole(plane, tuple(other for other in design if other != entry))
-            if exchanged is not None and abs(plane.residual(exchanged)) < abs(plane.residual(design)):
+            exchanged = _with_best_hole(plane, tuple(other for other in design if other != entry), waste)
+            if exchanged is not None and plane.score(exchanged, waste) < plane.score(design, waste):
                 design = exchanged
         if design == before:
             break
     return design
 
 
-def _with_best_hole(plane: Plane, design: Design) -> Design | None:
+def _with_best_hole(plane: Plane, design: Design, waste: float) -> Design | None:
     residual, best = plane.residual(design), (math.inf, (-1, -1))
     occupied = [place for place, _ in design]
     for place in set(range(len(plane.angles))) - set(occupied):
-        sizes = np.abs(residual + plane.changes[place])
+        sizes = np.abs(residual + plane.changes[place]) + waste * np.abs(plane.changes[place])
         for other, hole in design:
             sizes[plane.clashes(place, other)[:, hole]] = math.inf
         best = min(best, (float(sizes.min()), (place, int(sizes.argmin()))))

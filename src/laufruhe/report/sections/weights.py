@@ -86,12 +86,11 @@ def shafts(result: Result) -> list[Table]:
 def factors(result: Result) -> list[Table]:
     """Return a table of balance factors, a row for each throw with counterweights."""
     designs = [result.initial, result.final] if is_changed(result) else [result.final]
-    names = dict.fromkeys(balance.cylinders for design in designs for balance in balance_factors(design.engine))
-    # a weight that a design lacks counts as zero there
     columns = [
-        {balance.cylinders: f"{fixed(100.0 * balance.factor, 1)} %" for balance in balance_factors(design.engine, True)}
+        {balance.cylinders: f"{fixed(100.0 * balance.factor, 1)} %" for balance in balance_factors(design.engine)}
         for design in designs
     ]
-    rows = [(", ".join(cylinders), *(column.get(cylinders, DASH) for column in columns)) for cylinders in names]
+    names = dict.fromkeys(cylinders for column in columns for cylinders in column)
+    rows = [(", ".join(cylinders), *(column.get(cylinders, "no weight") for column in columns)) for cylinders in names]
     head = ("throw of", *(("initial", "final") if len(designs) > 1 else ("balance factor",)))
     return [Table(head, rows, title="Balance factors", note=_FACTOR, file="balance-factors")]
