@@ -26,7 +26,8 @@ from typer.testing import CliRunner
 
 from cli import scenes
 from faults import damage
-from laufruhe.cli import app, check, fidelity, solve, study  # noqa: F401
+from laufruhe.cli import app, check, solve, study  # noqa: F401
+from laufruhe.extensions.fidelity import explanation  # noqa: F401
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 LONGEST = 10.0

@@ -53,7 +53,7 @@ def test_a_problem_of_a_package_is_checked_and_solved(tmp_path: Path) -> None:
     assert checked.returncode == 0, checked.stderr
     assert "6 cylinders" in checked.stdout
     out, file = tmp_path / "out", tmp_path / "result.json"
-    solved = laufruhe(environment, "solve", PROBLEM, "--out", out, "--json", file)
+    solved = laufruhe(environment, "solve", PROBLEM, "--no-plots", "--out", out, "--json", file)
     assert solved.returncode == 0, solved.stderr
     record = json.loads(file.read_text(encoding="utf-8"))
     assert record["objective"]["name"] == "worst twentieth horizontal mount force"

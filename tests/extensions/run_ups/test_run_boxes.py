@@ -422,7 +422,7 @@ def test_the_tightest_limit_keeps_away_from_stops() -> None:
 
 @pytest.mark.slow
 def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
-    """Of 80 designs with stops: those under the bound break the limit, and the search comes near to the bound."""
+    """Of 50 designs with stops: those under the bound break the limit, and the search comes near to the bound."""
     problem = stopped("1.05 mm", objective={"minimise": "run-up force"}, search={"starts": 1})
     result = laufruhe.solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
@@ -430,7 +430,7 @@ def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
     given, r = evaluate(problem), np.random.default_rng(2)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     kept = met = 0
-    for x in low + (high - low) * r.random((80, len(low))):
+    for x in low + (high - low) * r.random((50, len(low))):
         design = with_mounts(given, problem.design(x.tolist()))
         met += design.value(OF_RUNS[1]) > 1.1e-3
         if design.violation(problem.limits) <= 0.0:

@@ -128,7 +128,7 @@ def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
 
 
 def test_stresses_that_no_sizes_and_weights_meet_are_named() -> None:
-    text = changed(TOGETHER, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"')
+    text = changed(FIXED_ROD, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"')
     # what the limit can reach is told beside it
     result = laufruhe.solve(laufruhe.load(text).changed(tolerance=1e-2))
     assert result.status is Status.INFEASIBLE
