@@ -231,7 +231,7 @@ class EngineParts(Parts):
         self, name: str, *, file: str, parts: Sequence[str] | None = None, sets: Table | None = None,
         count: int | None = None,
     ) -> Self:
-        """Return the engine with a choice. A part to choose: one row of a CSV file of parts that can be bought."""
+        """Return the engine with a choice. A part to choose: one row of a CSV file with the parts of a maker."""
         return self._with("choices", "choice", keys_of(locals()))
 
     def parts_price(self, *, total: Number) -> Self:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -11,7 +10,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from laufruhe.errors import counted
-from laufruhe.extensions.parts_lists.lists import Choices, Sheet
+from laufruhe.extensions.parts_lists.lists import Choices, PartsList
 from laufruhe.extensions.parts_lists.price import PartsPrice
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, require_distinct
@@ -24,12 +23,12 @@ _EXAMPLE = "write a head such as: name, stiffness.z [N/mm], and one line for eac
 
 
 class ChoiceTable(Table):
-    """A part to choose: one row of a CSV file of parts that can be bought."""
+    """A part to choose: one row of a CSV file with the parts of a maker."""
 
     closed: ClassVar[str] = "chooses a part, and is no number of the engine"
 
     name: Name
-    file: str = f.required("CSV file beside the problem file, with one row for each part that can be bought.")
+    file: str = f.required("CSV file beside the problem file, with one row for each part on sale.")
     parts: list[str] = f.optional(
         "Parts of this file whose keys are the columns, by their names in results or paths; all take one row.", []
     )
@@ -49,44 +48,44 @@ class PartsPriceTable(Table):
     total: f.NonNegative = f.required("Price of the parts as the file gives them; the prices of rows replace it.")
 
 
-def _cells(file: str, path: Path, where: str) -> list[tuple[int, list[str]]]:
+def _cells(table: ChoiceTable, path: Path, where: str) -> list[tuple[int, list[str]]]:
     """Return number and cells of each line of a CSV file that is neither blank nor a comment."""
     try:
         with path.open("rb") as stream:
-            text = stream.read(MAX_BYTES).decode("utf-8-sig")
+            content = stream.read(MAX_BYTES + 1)
+        lines = [(k, line) for k, line in enumerate(content.decode("utf-8-sig").splitlines(), 1) if line.strip()]
     except (OSError, ValueError) as error:
         reason = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
-        raise Refused(where, file, f"cannot be read ({reason})", "give a CSV file beside the problem") from None
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and line.lstrip()[0] != "#"]
+        raise Refused(where, table.file, f"cannot be read ({reason})", "give a CSV file beside the problem") from None
+    lines = [(k, line) for k, line in lines if not line.lstrip().startswith("#")]
     separator = max(",;\t", key=lines[0][1].count) if lines else ","
     rows = csv.reader((line for _, line in lines), delimiter=separator, skipinitialspace=True)
-    return [(k, [cell.strip() for cell in row]) for (k, _), row in zip(lines, rows, strict=False)]
+    cells = [(k, [cell.strip() for cell in row]) for (k, _), row in zip(lines, rows, strict=False)]
+    if not 2 <= len(cells) <= MAX_ROWS + 1 or len(content) > MAX_BYTES:
+        rule = f"has {counted(max(len(cells) - 1, 0), 'row')}, and 1 to {MAX_ROWS} are allowed in {MAX_BYTES:,} bytes"
+        raise Refused(where, table.file, rule, _EXAMPLE)
+    return cells
 
 
-def _sheet(table: ChoiceTable, context: ExtensionContext, where: str) -> Sheet:
-    at, lines = f"{where}.file", _cells(table.file, context.folder / table.file, f"{where}.file")
-    (_, heads), *rows = lines or [(1, [])]
-    if not 0 < len(rows) <= MAX_ROWS or len(heads) < 2:
-        rule = f"has {counted(len(heads), 'column')} and {counted(len(rows), 'row')}, and may have up to {MAX_ROWS}"
-        raise Refused(at, table.file, rule, _EXAMPLE)
-    if len(set(heads)) < len(heads) or "" in heads:
-        twice = next(head for head in heads if heads.count(head) > 1 or not head)
-        raise Refused(
-            at, table.file, f"has no column or two columns '{twice}'", "give each column a heading of its own"
-        )
+def _list(table: ChoiceTable, context: ExtensionContext, where: str) -> PartsList:
+    at = f"{where}.file"
+    (_, heads), *rows = _cells(table, context.folder / table.file, at)
+    if twice := [head for k, head in enumerate(heads) if not head or head in heads[:k]]:
+        rule = f"has no head for a column, or two heads '{twice[0]}'"
+        raise Refused(at, table.file, rule, "give each column a head of its own")
+    names = set[str]()
     for line, row in rows:
-        if len(row) != len(heads):
-            rule = f"has {counted(len(row), 'cell')} in line {line}, row '{row[0]}', and {len(heads)} in its head"
-            raise Refused(at, table.file, rule, "give each row as many cells as the head")
-    names = Counter(row[0] for _, row in rows)
-    if "" in names or max(names.values()) > 1:
-        name = "" if "" in names else max(names, key=names.__getitem__)
-        line = [line for line, row in rows if row[0] == name][-1]
-        rule = f"has in line {line}, column '{heads[0]}': '{name}', which names no part or two parts"
-        raise Refused(at, table.file, rule, "give each row a name of its own")
-    return Sheet(
+        place = f"has in line {line}, row '{row[0]}'"
+        if len(row) != len(heads) or len(heads) < 2:
+            rule = f"{place}: {counted(len(row), 'cell')}, and {len(heads)} in its head"
+            raise Refused(at, table.file, rule, "give each row as many cells as the head, two or more")
+        if not row[0] or row[0] in names:
+            rule = f"{place}, column '{heads[0]}': no name, or that of another row"
+            raise Refused(at, table.file, rule, "give each row a name of its own")
+        names.add(row[0])
+    return PartsList(
         table.name, table.file, where, tuple(heads), tuple(tuple(row) for _, row in rows),
-        tuple(line for line, _ in rows), tuple(table.parts), dict(table.sets), table.count or max(len(table.parts), 1),
+        tuple(line for line, _ in rows), tuple(table.parts), table.sets, table.count or max(len(table.parts), 1),
     )  # fmt: skip
 
 
@@ -94,8 +93,8 @@ def _choices(tables: list[ChoiceTable], problem: Problem, context: ExtensionCont
     require_distinct([table.name for table in tables], "choices", "choices have one name")
     if len(tables) > MAX_LISTS:
         raise Refused("choices", None, f"has {len(tables)} lists", f"choose from at most {MAX_LISTS} at once")
-    sheets = tuple(_sheet(table, context, f"choices[{k}]") for k, table in enumerate(tables, 1))
-    return replace(problem, extras=(*problem.extras, Choices(sheets)))
+    lists = tuple(_list(table, context, f"choices[{k}]") for k, table in enumerate(tables, 1))
+    return replace(problem, extras=(*problem.extras, Choices(lists)))
 
 
 def _price(table: PartsPriceTable, problem: Problem, _: ExtensionContext) -> Problem:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
-from laufruhe.extensions.parts_lists.lists import Choices, Outcome
+from laufruhe.errors import counted
+from laufruhe.extensions.parts_lists.lists import RANKED, Choices, Outcome
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import figure, number
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
-
-MAX_ROWS = 8
-"""Number of combinations that the report shows."""
 
 
 def _outcome(result: Result) -> Outcome | None:
@@ -24,57 +23,55 @@ def _outcome(result: Result) -> Outcome | None:
 def _tables(result: Result) -> list[Table]:
     outcome, unit = _outcome(result), objective_unit(result)
     assert outcome is not None
-    best = outcome.solved[0]
-    heads = list(dict.fromkeys(head for parts in outcome.lists for head in parts.sheet.heads[1:]))
-    rows = []
-    for parts, row in zip(outcome.lists, best.rows, strict=True):
-        cells = dict(zip(parts.sheet.heads, parts.sheet.rows[row], strict=True))
-        rows.append(
-            [
-                parts.sheet.name,
-                parts.sheet.rows[row][0],
-                f"{row + 1} of {len(parts.sheet.rows)}",
-                *(cells.get(h, "-") for h in heads),
-            ]
-        )
-    total = sum(parts.prices[row] for parts, row in zip(outcome.lists, best.rows, strict=True))
-    note = f"Price of all parts that are bought: {number(total, 6)}." if total else ""
-    chosen = Table(["list", "row", "line", *heads], rows, title="Chosen parts", left=2, note=note, file="chosen-parts")
-    next_rows = [
-        [*(parts.sheet.rows[row][0] for parts, row in zip(outcome.lists, known.rows, strict=True)),
-         figure(known.value, unit, 6) if math.isfinite(known.value) else "-",
-         figure(known.bound, unit, 6) if math.isfinite(known.bound) else "-", known.proof]
-        for known in outcome.solved
-    ]  # fmt: skip
+    pairs = list(zip(outcome.lists, outcome.solved[0].rows, strict=True))
+    heads = list(dict.fromkeys(head for parts in outcome.lists for head in parts.heads[1:]))
+    cells = [dict(zip(parts.heads, parts.rows[row], strict=True)) for parts, row in pairs]
+    rows = [
+        [parts.name, parts.rows[row][0], f"{row + 1} of {len(parts.rows)}", *(texts.get(head, "-") for head in heads)]
+        for (parts, row), texts in zip(pairs, cells, strict=True)
+    ]
+    price = sum(parts.prices[row] for parts, row in pairs)
+    note = f"Price of all parts that are bought: {number(price, 6)}." if price else ""
     rest = outcome.whole - len(outcome.solved) - outcome.excluded
     counts = (
-        f"Of {outcome.whole:,} combinations {len(outcome.solved):,} were solved, and bounds of subsets exclude "
-        f"{outcome.excluded:,}, which are no better than the best one" + (f"; {rest:,} are left." if rest else ".")
+        f"Of {counted(outcome.whole, 'combination')} {len(outcome.solved):,} were solved. Bounds of subsets exclude "
+        f"{outcome.excluded:,}: none of these is better than those shown" + (f"; {rest:,} are left." if rest else ".")
     )
-    head = [*(parts.sheet.name for parts in outcome.lists), "objective", "lower bound", "proof"]
-    ranked = Table(
-        head, next_rows[:MAX_ROWS], title="Best combinations", left=len(outcome.lists), note=counts,
-        file="combinations", omitted=max(len(next_rows) - MAX_ROWS, 0),
-    )  # fmt: skip
-    return [chosen, ranked]
+    ranked = _combinations(result)
+    best = [
+        [figure(cell, unit, 6) if isinstance(cell, float) and math.isfinite(cell) else cell for cell in row]
+        for row in ranked.rows[:RANKED]
+    ]
+    return [
+        Table(["list", "row", "line", *heads], rows, "Chosen parts", 2, note, file="chosen-parts"),
+        replace(ranked, rows=best, title="Best combinations", note=counts),
+    ]
+
+
+def _combinations(result: Result) -> Table:
+    outcome = _outcome(result)
+    assert outcome is not None
+    rows = [[*outcome.names(known), known.value, known.bound, known.proof] for known in outcome.solved]
+    head = [*(parts.name for parts in outcome.lists), "objective", "lower bound", "proof"]
+    return Table(head, rows, left=len(outcome.lists))
 
 
 def _record(result: Result) -> dict[str, Any]:
     outcome = _outcome(result)
     assert outcome is not None
-
-    def named(rows: tuple[int, ...]) -> dict[str, str]:
-        return {parts.sheet.name: parts.sheet.rows[row][0] for parts, row in zip(outcome.lists, rows, strict=True)}
-
     solved = [
-        {"rows": named(known.rows), "value": known.value if math.isfinite(known.value) else None,
-         "lower_bound": known.bound if math.isfinite(known.bound) else None, "proof": known.proof}
+        {
+            "rows": dict(zip((parts.name for parts in outcome.lists), outcome.names(known), strict=True)),
+            "value": known.value if math.isfinite(known.value) else None,
+            "lower_bound": known.bound if math.isfinite(known.bound) else None,
+            "proof": known.proof,
+        }
         for known in outcome.solved
-    ]  # fmt: skip
-    return {"rows": named(outcome.solved[0].rows), "combinations": outcome.whole, "excluded": outcome.excluded,
-            "solved": solved}  # fmt: skip
+    ]
+    return {"combinations": outcome.whole, "excluded": outcome.excluded, "rows": solved[0]["rows"], "solved": solved}
 
 
 SECTION = Section(
-    "choices", lambda result: _outcome(result) is not None, _tables, _record, ("chosen-parts", "combinations")
-)
+    "choices", lambda result: _outcome(result) is not None, _tables, _record, ("chosen-parts",),
+    {"combinations": (lambda result: _outcome(result) is not None, _combinations)},
+)  # fmt: skip
