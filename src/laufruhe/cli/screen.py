@@ -70,7 +70,8 @@ def command_line(context: typer.Context) -> str:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
             words += parameter.opts[:1] if parameter.param_type_name == "option" else []
-            words += [] if isinstance(value, bool) else [f"{value:g}" if isinstance(value, float) else str(value)]
+            values = [] if isinstance(value, bool) else value if isinstance(value, list) else [value]
+            words += [f"{one:g}" if isinstance(one, float) else str(one) for one in values]
     return typed(*words)
 
 

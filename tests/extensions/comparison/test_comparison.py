@@ -60,6 +60,7 @@ def test_numbers_are_those_of_the_results(folder: Path) -> None:
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "data:image/svg+xml" in page
     assert "operating_points.1.mean_piston_speed" in page
+    assert f"laufruhe compare {folder / 'saved'} {folder / 'fixed.toml'} --out" in page
 
 
 def test_inputs_that_differ_are_compared_as_quantities(designs: list[Design]) -> None:

@@ -99,7 +99,7 @@ def _note(group: str, designs: Sequence[Design]) -> str:
     if group == OBJECTIVES:
         unknown = [f"{design.name}: {design.note}" for design in designs if design.note]
         text = "Each objective, with its operating points, is evaluated for every design whose cylinders, and mounts "
-        text += "or other places of the objective, have the same names."
+        text += "or other places of the objective, have the same names. Limits of other problems are not checked."
         return f"{text} Not evaluated with other objectives: {'; '.join(unknown)}." if unknown else text
     return "A dash: not in this file." if group == INPUTS else ""
 
