@@ -72,4 +72,4 @@ def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
     stars = even_stars(phasing)
     if not stars:
         return no_star(problem, why_none_fires(phasing)[0])
-    return solve_every_order(problem, phasing, stars, lambda part, _: decide(replace(part, phasing=None)), MAX_STARS)
+    return solve_every_order(problem, phasing, stars, decide, MAX_STARS)

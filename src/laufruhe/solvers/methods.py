@@ -183,7 +183,7 @@ _CORE: tuple[Method, ...] = (
     Method(
         "local programs of all numbers", dict.fromkeys(KINDS.values(), _ANY), ProofStrength.RELAXED, solve_all_numbers,
         accepts_norm=lambda _: True,
-        proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most",
+        proves="a local optimum by exact evaluations, without a bound; of 60 stars at most, each by its own method",
     ),
 )  # fmt: skip
 

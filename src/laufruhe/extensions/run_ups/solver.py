@@ -82,9 +82,7 @@ def _run_result(
         has_stops = any(spring.stop_gap < math.inf for _, spring in every_spring(problem.engine.mounts))
         if phasing.continuous or has_stops or not kinds <= _LINEAR | {Kind.STAR}:
             return None
-        return solve_every_order(
-            problem, phasing, even_stars(phasing), lambda star_problem, _: decide(replace(star_problem, phasing=None))
-        )
+        return solve_every_order(problem, phasing, even_stars(phasing), decide)
     rows = RunRows.from_problem(problem, simulated_measures(problem)) if kinds <= _LINEAR else None
     if rows is not None:
         return solve_run_cones(problem, limits, terms, rows, decide)

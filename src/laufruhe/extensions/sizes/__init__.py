@@ -28,5 +28,5 @@ EXTENSION = Extension(
         "running-gear mass  0 0 0  0 + 0  0  0 0  0  torsion=0 electric_machines=0",
     ),
     keys=(f"{_HERE}.file:KEY",),
-    methods=tuple(f"{_HERE}.methods:{name}" for name in ("ALONE", "WITH_STARS")),
+    methods=(f"{_HERE}.methods:ALONE",),
 )

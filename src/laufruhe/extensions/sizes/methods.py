@@ -1,4 +1,4 @@
-"""Methods for open sizes of the running gear."""
+"""Method for open sizes of the running gear."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from laufruhe.numerics.norms import Norm
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.solvers.method import BUILT, OF_SIZES_ALONE, Method, imported, is_no_number, is_pointwise
-
-_ALONE = {Kind.SIZE: (Dependence.MASSES,), Kind.UNBALANCE: (Dependence.AFFINE,)}
+from laufruhe.solvers.method import OF_SIZES_ALONE, Method, imported, is_no_number, is_pointwise
 
 
 def _is_of_row_lengths(norm: Norm) -> bool:
@@ -16,15 +14,9 @@ def _is_of_row_lengths(norm: Norm) -> bool:
 
 
 ALONE = Method(
-    "boxes of sizes", _ALONE, ProofStrength.EXACT, imported("laufruhe.extensions.sizes.solver:solve_sizes"),
+    "boxes of sizes", {Kind.SIZE: (Dependence.MASSES,), Kind.UNBALANCE: (Dependence.AFFINE,)}, ProofStrength.EXACT,
+    imported("laufruhe.extensions.sizes.solver:solve_sizes"),
     refines_fidelity=True, known_channels=OF_SIZES_ALONE, accepts_norm=_is_of_row_lengths,
     accepts_constant=is_no_number, before="linear matrix inequalities",
     proves="the optimum (Z12, Z14); with an open rod length within a gap, if kinks of a load move with it (Z13)",
-)  # fmt: skip
-WITH_STARS = Method(
-    "stars, each with boxes of sizes", {Kind.STAR: BUILT, **_ALONE}, ProofStrength.EXACT,
-    imported("laufruhe.extensions.sizes.solver:solve_star_sizes"),
-    refines_fidelity=True, known_channels=OF_SIZES_ALONE, accepts_norm=_is_of_row_lengths,
-    accepts_constant=is_no_number,
-    before="linear matrix inequalities", proves="the optimum, of 60 even stars or firing orders at most",
 )  # fmt: skip

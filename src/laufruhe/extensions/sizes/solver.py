@@ -1,7 +1,4 @@
-"""Optimum of sizes of the running gear, and of unbalances with them: local programs propose, boxes prove (Z12, Z14).
-
-Crank stars, firing orders and shafts with open sizes are a problem for each star.
-"""
+"""Optimum of sizes of the running gear, and of unbalances with them: local programs propose, boxes prove (Z12, Z14)."""
 
 from __future__ import annotations
 
@@ -35,15 +32,11 @@ from laufruhe.solvers.smooth.local_programs import (
     prove_design,
     spread_starts,
 )
-from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
-from laufruhe.solvers.stars.star_results import no_star
-from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 MAX_WITH_ROD, MAX_PROGRAMS = 300, 400
 """Most boxes if the rod length is open, which takes ten times as long, and if each box has cone programs."""
-STARTS, MAX_STARS = 3, 60
-"""Local searches, and most stars that are solved one by one."""
+STARTS = 3
+"""Most local searches."""
 # fewest samples of the programs of boxes: rough, and for a small gap
 FEW_STEPS, MANY_STEPS = 180, 720
 # relative margin of local programs inside limits, below the feasibility tolerance
@@ -88,11 +81,8 @@ class SizeProgram(LocalProgram):
         return self.shares(rebalance(problem, fixed, sizes).design.values)
 
 
-def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
-    """Return the optimal sizes and unbalances with their proof, or the limits that no sizes satisfy.
-
-    `known` is the value of another design: if this problem has a feasible design, a bound above it is enough.
-    """
+def solve_sizes(problem: Problem) -> Result:
+    """Return the optimal sizes and unbalances with their proof, or the limits that no sizes satisfy."""
     started = time.perf_counter()
     initial, model = evaluate(problem), SizeModel(problem)
     check_acts(model)
@@ -111,9 +101,6 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
         maximum = problem.search.boxes_or(default_budget)
         if boxes is None:
             return BoxResult(0.0, 0)
-        if known < value < math.inf:
-            # the gap tolerance is a share of the value
-            value, gap_tolerance = known, gap_tolerance * known / value
         place = program.columns(program.shares(design.values))[program.sized]
         return divided_sizes(
             boxes, value, gap_tolerance, maximum, witness_of(design, place) if value < math.inf else None
@@ -170,25 +157,3 @@ def check_acts(model: SizeModel) -> None:
             raise ModelError(
                 f"{decision.name} is open, but no objective or limit depends on this size; fix it, or limit a stress"
             )
-
-
-def solve_star_sizes(problem: Problem) -> Result:
-    """Return the best crank star with its optimal sizes and unbalances.
-
-    The best objective so far bounds the search of the next star.
-    """
-    phasing = problem.phasing
-    if phasing is None:
-        raise ValueError("neither throws nor firing order of the problem are open")
-    started = time.perf_counter()
-    if phasing.continuous or phasing.throw_bounds is not None:
-        rule = "open sizes of the running gear need even firing or fixed throws"
-        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or fix the sizes")
-    if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MAX_STARS:
-        many = f"more than {MAX_STARS} crank stars are open together with sizes of the running gear"
-        raise ModelError(f"{many}; fix the firing order or the sizes")
-    stars = even_stars(phasing)
-    if not stars:
-        return no_star(problem, why_none_fires(phasing)[0])
-    result = solve_every_order(problem, phasing, stars, solve_sizes)
-    return replace(result, timing={**result.timing, "phasing": time.perf_counter() - started})

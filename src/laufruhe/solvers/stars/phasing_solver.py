@@ -19,7 +19,7 @@ from laufruhe.problem.evaluation import with_more_samples
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of, make_certificate
+from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.throws.firing_average import firing_bound
 from laufruhe.solvers.conclusion import quote_names, refine_result
 from laufruhe.solvers.result import Result, Status
@@ -35,7 +35,7 @@ MAX_TIMES, ROUNDS = 16, 2
 """Largest factor of samples for a search that cannot prove its best crank star, and number of such searches."""
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
 """A crank star, and the steps of its throws if it fires evenly."""
-Decide: TypeAlias = Callable[[Problem, float], Result]
+Decide: TypeAlias = Callable[[Problem], Result]
 Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], EvenStarResult]
 
 
@@ -181,9 +181,8 @@ def even_stars(phasing: Phasing) -> list[Star]:
 
 
 def solve_every_order(
-    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda fixed, _: solve_fixed(fixed),
-    maximum: int | None = None,
-) -> Result:  # fmt: skip
+    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = solve_fixed, maximum: int | None = None
+) -> Result:
     """Solve every combination of crank star, firing order with loads of its own, and set of shafts.
 
     Parameters
@@ -191,9 +190,9 @@ def solve_every_order(
     stars
         Crank stars with the steps of their throws.
     decide
-        Solver of the other decisions. Its arguments are the problem of a design and the smallest objective so far [SI].
+        Solver of the other decisions of a design.
     maximum
-        Number of random designs to solve, without a bound; None to solve all designs, with their bound.
+        Largest number of designs to solve, chosen at random if there are more; None to solve all.
     """
     orders = {star: ranked_orders(phasing, star, steps) for star, steps in stars}
     if not any(orders.values()):
@@ -219,7 +218,9 @@ def solve_every_order(
         report_progress("firing orders and sets of shafts", k, len(designs), minimum)
         if results and (is_time_over() or time.perf_counter() - started > phasing.time_limit):
             break
-        results.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.problem_of(candidate)), minimum)))
+        results.append(
+            StarDesign(candidate, decide(replace(_with_half_tolerance(phasing.problem_of(candidate)), phasing=None)))
+        )
     complete = len(results) == total
     solved = [design for design in results if design.is_feasible]
     if not solved:
@@ -242,7 +243,9 @@ def solve_every_order(
         method += f", {len(results)} of all {total} chosen at random and solved"
     proof = best.result.certificate
     method_text, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
-    strength = ProofStrength.EXACT if maximum is None else ProofStrength.RELAXED
+    proofs = [design.result.certificate for design in results if design.result.certificate is not None]
+    are_exact = complete and all(own.kind in (Proof.GLOBAL, Proof.WITHIN_GAP) for own in proofs)
+    strength = ProofStrength.EXACT if maximum is None or are_exact else ProofStrength.RELAXED
     result, value_error = refine_result(best.result, bound, zero_level)
     best = replace(best, result=result)
     certificate = make_certificate(
