@@ -244,7 +244,7 @@ def solve_every_order(
     proof = best.result.certificate
     method_text, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     proofs = [design.result.certificate for design in results if design.result.certificate is not None]
-    are_exact = complete and all(own.kind in (Proof.GLOBAL, Proof.WITHIN_GAP) for own in proofs)
+    are_exact = complete and all(x.kind in (Proof.GLOBAL, Proof.WITHIN_GAP) for x in proofs)
     strength = ProofStrength.EXACT if maximum is None or are_exact else ProofStrength.RELAXED
     result, value_error = refine_result(best.result, bound, zero_level)
     best = replace(best, result=result)
