@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import casadi as ca
@@ -355,20 +354,15 @@ def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
     assert solve_joint(problem).objective.value == pytest.approx(13.106325, rel=1e-5)
 
 
-def test_a_limit_that_is_left_out_at_first_comes_back_where_it_is_felt(tmp_path, monkeypatch):
-    def found(maximum: float, room: float):
-        monkeypatch.setattr("laufruhe.solvers.mounts.search.FAR_FROM_LIMIT", room)
+def test_a_limit_on_a_load_has_a_price_where_it_is_felt(tmp_path):
+    def found(maximum: float):
         limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{maximum} N"\n'
         return solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limits, SEARCH))
 
-    whole, felt = found(3.0, math.inf), found(3.0, -math.inf)
+    felt, wide = found(3.0), found(1e6)
     assert felt.limits[0].active
     assert felt.limits[0].value == pytest.approx(3.0, rel=1e-5)
-    assert felt.objective.value == pytest.approx(whole.objective.value, rel=1e-6)
-    assert felt.limits[0].shadow_price == pytest.approx(whole.limits[0].shadow_price, rel=1e-3)
     assert felt.limits[0].shadow_price > 0.0
-    wide, free = found(1e6, -math.inf), found(1e6, math.inf)
-    assert wide.objective.value == pytest.approx(free.objective.value, rel=1e-6)
     assert wide.objective.value < 0.9 * felt.objective.value
     assert wide.limits[0].shadow_price == 0.0
 
@@ -393,21 +387,6 @@ def test_a_search_has_as_many_starts_as_it_is_given(starts, tmp_path):
         search.run()
     assert list(search.best.design.values) == given
     assert search.best.design.value == pytest.approx(values[0], rel=1e-12)
-
-
-def test_limits_with_room_at_every_start_are_no_rows(tmp_path):
-    """Limits on loads of which every start leaves more than half; a search has hundreds of rows less."""
-    limit = '[[constraints]]\nlimit = "rms mount force"\nmax = "1 N"\n'
-    own = "[search]\nstarts = 3\n[fidelity]\nsamples = 72\n"
-    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limit, own)
-    (held,) = problem.limits
-    designs = [problem.design(mounts) for mounts, _ in start_points(problem)[0]]
-    maximum = max(evaluate(problem, engine).value(held.measure) for engine in designs)
-    sides = {"wide": 2.1, "near": 1.9, "broken": 0.5}
-    limits = tuple(replace(held, name=name, maximum=share * maximum) for name, share in sides.items())
-    search = MountSearch(replace(problem, limits=limits), evaluate(problem))
-    assert [each.name for each in search._ignored] == ["wide"]
-    assert set(search.joint.program.constraint_names) == {"near", "broken"}
 
 
 @pytest.mark.parametrize(
@@ -445,26 +424,6 @@ def test_what_nothing_open_moves_is_a_number_of_the_program(tmp_path):
     own = 2.0 * evaluate(alone).value(roll.measure)
     assert own > 0.0
     assert at(mixed, start)[0] == pytest.approx(at(plain, start)[0] + own, rel=1e-9)
-
-
-def test_a_limit_that_turns_out_to_hold_is_searched_with(tmp_path):
-    """A limit that was left out returns as a row once a good design is at it, and the search is repeated."""
-    limit = '[[constraints]]\nlimit = "rms mount force"\nmax = "1 N"\n'
-    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limit, SEARCH)
-    value = evaluate(problem).value(problem.limits[0].measure)
-    for room, holds in ((0.02, True), (0.3, False)):
-        held = replace(problem.limits[0], maximum=value / (1.0 - room))
-        search = MountSearch(replace(problem, limits=(held,)), evaluate(problem))
-        search._ignored, rows, none = {held}, [], np.zeros(0)
-        place = search.joint.start([d.start for d in problem.mount_decisions], none)
-        end = LocalOptimum(place, 1.0, none, none, 0.0, 0.0, 1, 0.0, Ending.CONVERGED, 0)
-
-        def look(search=search, rows=rows, end=end, held=held):
-            rows.append(held.name in search._program().program.constraint_names)
-            search._evaluate_optima([end])
-
-        search._repeat_with_active_limits(look)
-        assert rows == ([False, True] if holds else [False])
 
 
 def test_unbalances_on_the_mounts_of_a_design_become_the_best_of_these_mounts(tmp_path):

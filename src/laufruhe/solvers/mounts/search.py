@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,6 @@ from laufruhe.numerics.budget import is_time_over, timed_rounds
 from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -45,10 +44,6 @@ SMALL = 1e-2
 MAX_SIZES = 3
 # standard deviation of starts around a local optimum, relative to its numbers or their range
 SPREAD = 0.4
-# starts at which limits are checked
-CHECKED_STARTS = 6
-# relative distance to a limit from which the program leaves it out, and below which the program includes it again
-FAR_FROM_LIMIT, NEAR_LIMIT = 0.5, 0.05
 # deviation of start throws from their crank star [rad]
 THROW_DEVIATION = 0.02
 
@@ -108,13 +103,11 @@ class MountSearch:
             mounts, columns = first
             columns = self._points[0][1] if columns is None else columns
             self._points = [(mounts, columns), *self._points[0 if keep_initial else 1 :]]
-        self._ignored = self._inactive_limits()
         report_progress("smooth program of all decisions")
         self.joint = self._program()
         self._initial = initial_design(problem, initial) if moves is None else None
         self.best: SearchResult | None = None
         self._nearly_feasible: list[SearchResult] = []
-        self._active_again: set[Limit] = set()
         self.optima: tuple[LocalOptimum, ...] = ()
 
     def run(self) -> None:
@@ -128,7 +121,7 @@ class MountSearch:
             self._update_best(SearchResult(start, self.joint))
             return
         zero_level = numerical_zero(self.problem)
-        self._repeat_with_active_limits(lambda: self._search(self._points))
+        self._search(self._points)
         for _ in timed_rounds(MAX_SIZES):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= zero_level:
                 break
@@ -166,9 +159,7 @@ class MountSearch:
                 # a start that exceeds a limit by rounding is no candidate
                 if start is not None and start.violation <= 0.0:
                     self._update_best(SearchResult(start, self.joint))
-        self._repeat_with_active_limits(
-            lambda: self._evaluate_optima(self._solve([self.joint.start(*start) for start in starts]))
-        )
+        self._evaluate_optima(self._solve([self.joint.start(*start) for start in starts]))
         self._tighten()
         return self.best is not None and (previous is None or self.best.rank < previous.rank)
 
@@ -214,29 +205,7 @@ class MountSearch:
         self._evaluate_optima(optima)
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
-        limits = tuple(limit for limit in self.problem.limits if limit not in self._ignored)
-        problem = self.problem if not self._ignored else replace(self.problem, limits=limits)
-        return SmoothProgram(problem, self._size, margin, self.moves, coarser=self._coarser)
-
-    def _inactive_limits(self) -> set[Limit]:
-        # each load limit would add hundreds of rows to the program
-        if self.moves is not None:
-            return set()
-        limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
-        for place in self._points[:CHECKED_STARTS] if limits else ():
-            design = design_at_start(self.problem, place)
-            limits = [
-                x for x in limits if design is not None and design.evaluation.check_limit(x).violation < -FAR_FROM_LIMIT
-            ]
-        return set(limits)
-
-    def _repeat_with_active_limits(self, search: Callable[[], None]) -> None:
-        search()
-        while self._active_again and not (is_time_over() and self._is_feasible):
-            self._ignored = self._ignored - self._active_again
-            self._active_again, self.optima, self._nearly_feasible = set(), (), []
-            self.joint = self._program()
-            search()
+        return SmoothProgram(self.problem, self._size, margin, self.moves, coarser=self._coarser)
 
     @property
     def _iterations(self) -> int:
@@ -255,24 +224,15 @@ class MountSearch:
     def _evaluate_optima(self, optima: Sequence[LocalOptimum]) -> None:
         """Evaluate local optima by the exact model, whatever status the solver reports."""
         self.optima += tuple(optima)
-        designs: list[Design] = []
         for k, optimum in enumerate(optima):
             best = self.best.design.value if self.best is not None and self._is_feasible else np.inf
             report_progress("evaluated local optima", k, len(optima), best)
             design = self._evaluate_optimum(optimum, self.joint)
             if design is not None:
-                designs.append(design)
                 result = SearchResult(design, self.joint, optimum)
                 self._update_best(result)
                 if FEASIBLE < design.violation <= NEAR:
                     self._nearly_feasible.append(result)
-        limits = [limit for limit in self.problem.limits if limit not in self._ignored]
-        best = self.best.design.value if self.best is not None and self._is_feasible else np.inf
-        good = [design for design in designs if design.value <= best and design.evaluation.violation(limits) <= NEAR]
-        self._active_again = {
-            limit for limit in self._ignored
-            if any(design.evaluation.check_limit(limit).violation > -NEAR_LIMIT for design in good)
-        }  # fmt: skip
 
     def _update_best(self, result: SearchResult) -> None:
         if self.best is None or result.rank < self.best.rank:
