@@ -167,9 +167,9 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
         and (first in tables or first not in {label for label, _ in labelled})
     ):
         parent, _, last = name.rpartition(".")
-        keys = keys_of(dict(tables), parent)
+        keys = keys_of(tables, parent)
         parent_value = at(tables, keys)
-        return (*keys, last) if isinstance(parent_value, dict) else keys_of(dict(tables), name)
+        return (*keys, last) if isinstance(parent_value, dict) else keys_of(tables, name)
     names = [
         f"{label}.{key}"
         for label, keys in labelled

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -75,22 +75,7 @@ def at(tables: dict[str, Any], where: str) -> Any:
 
 def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
     """Return a copy of tables with another value at a path; raise `Refused` if problem files have no such key."""
-    return nested.with_value_at(tables, address_of(tables, where), value)
-
-
-def address_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
-    """Return the address of a path, also of a key of problem files that this file lacks; raise `Refused` for others."""
-    node: Any = tables
-    keys, parts = list[Any](), parts_of(where)
-    for k, part in enumerate(parts):
-        options = _options(node)
-        if part not in options:
-            address = (*keys, *parts[k:])
-            is_known = isinstance(node, dict) and bool(nested.annotations_at(file_model(), address))
-            return address if is_known else keys_of(tables, where)
-        keys.append(options[part])
-        node = node[options[part]]
-    return tuple(keys)
+    return nested.with_value_at(tables, keys_of(tables, where, adds=True), value)
 
 
 def without(tables: dict[str, Any], where: str) -> dict[str, Any]:
@@ -109,14 +94,19 @@ def joined(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     return {**tables, **changes, **{key: joined(tables[key], changes[key]) for key in merged}}
 
 
-def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
-    """Return the address (keys and indices) of a path in a problem file; raise `Refused` if it leads nowhere."""
+def keys_of(tables: Mapping[str, Any], where: str, adds: bool = False) -> tuple[Any, ...]:
+    """Return the address (keys and indices) of a path in a problem file; raise `Refused` if it leads nowhere.
+
+    With `adds` the path may be that of a key of problem files that this file lacks.
+    """
     node: Any = tables
-    keys = []
-    parts = parts_of(where)
+    keys, parts = list[Any](), parts_of(where)
     for k, part in enumerate(parts):
         options = _options(node)
         if part not in options:
+            address = (*keys, *parts[k:])
+            if adds and isinstance(node, Mapping) and nested.annotations_at(file_model(), address):
+                return address
             remedy = _remedy(tables, node, parts, k)
             raise Refused(".".join(parts[: k + 1]), None, "is not the path of a quantity of this problem", remedy)
         keys.append(options[part])
@@ -134,7 +124,7 @@ def path_text(tables: Any, place: Sequence[str | int]) -> str:
     return ".".join(parts)
 
 
-def _remedy(tables: dict[str, Any], node: Any, parts: Sequence[str], k: int) -> str:
+def _remedy(tables: Mapping[str, Any], node: Any, parts: Sequence[str], k: int) -> str:
     # the path fails at its part `k`
     for path in _paths(tables):
         remaining = iter(path)
@@ -163,7 +153,7 @@ def parts_of(where: str) -> list[str]:
 
 def _options(node: Any) -> dict[str, Any]:
     # keys and indices have names; entries of lists also have numbers from one
-    if isinstance(node, dict):
+    if isinstance(node, Mapping):
         return {key: key for key in node}
     if isinstance(node, list):
         # limits without a name have a default one

@@ -15,7 +15,7 @@ from pydantic import Field
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.files import fields as f
 from laufruhe.files.measures import QuantityName
-from laufruhe.files.study_tables import CaseTable, SweepAxis, SweepTable, address_of, axis_of, changed
+from laufruhe.files.study_tables import CaseTable, SweepAxis, SweepTable, axis_of, changed, keys_of
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, place_measures
@@ -258,11 +258,11 @@ class SweptPart(Part):
         tables, reasons = problem_files.tables(Point(case.model_copy(update={"set": {}}))), {}
         for path, value in case.set.items():
             with problem_files.named(case):
-                reasons[address_of(tables, path)] = f"is swept, and set by '{case.name}' too"
+                reasons[keys_of(tables, path, adds=True)] = f"is swept, and set by '{case.name}' too"
                 tables = changed(tables, path, value)
         for sweep in self.sweep:
             with problem_files.named(case):
-                keys = address_of(tables, sweep.quantity)
+                keys = keys_of(tables, sweep.quantity, adds=True)
             for earlier, rule in reasons.items():
                 if keys[: len(earlier)] == earlier[: len(keys)]:
                     raise problem_files.refused(case, sweep.quantity, rule, "leave out one of the two")
