@@ -17,7 +17,6 @@ WORDS = {
     "cli": "commands",
     "python": "engines in code",
     "report": "pages, tables, pictures",
-    "live": "what a page shows while numbers move",
     "studies": "sweeps and comparisons",
     "present": "words and numbers for both",
     "files": "TOML and CSV, messages, schema",

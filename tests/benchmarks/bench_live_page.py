@@ -24,7 +24,7 @@ from playwright.sync_api import CDPSession, Page
 
 from browser.chromium import MISSING, executable, launched, watched
 from laufruhe import load, solve
-from laufruhe.live import live_model
+from laufruhe.extensions.served_page.live.section import sliders
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.report.result_report import result_document
@@ -91,7 +91,7 @@ def report(problem: Problem, folder: Path) -> Path:
     """The HTML report of the solved problem, without pictures."""
     result = solve(problem)
     path = folder / f"{problem.name}.html"
-    page = as_html(result_document(result, [], "laufruhe"), {}, live_model(problem, result))
+    page = as_html(result_document(result, [], "laufruhe"), {}, sliders(result))
     path.write_text(page, encoding="utf-8")
     return path
 

@@ -10,9 +10,9 @@ from playwright.sync_api import Browser, Page, expect
 
 from browser import chromium
 from browser.chromium import serious
+from extensions.served_page.live_pages import designs, evaluated, model_of, page_of, problem_of, with_unknown_norm
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import objective_value
-from live.pages import designs, evaluated, model_of, page_of, problem_of, with_unknown_norm
 
 pytestmark = pytest.mark.slow
 MEASURES = "values => laufruheLive.page.then(page => (page.setDesign(values), page.drawNow(), page.measures()))"

@@ -13,13 +13,13 @@ from playwright.sync_api import Page, expect
 from typer.testing import CliRunner
 
 from browser import chromium, pages
+from extensions.served_page.live_pages import designs, evaluated, model_of, page_of, problem_of
 from laufruhe.cli import app
 from laufruhe.files.reader import load
 from laufruhe.present.numbers import figure
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
-from live.pages import designs, evaluated, model_of, page_of, problem_of
 
 pytestmark = pytest.mark.slow
 STATES, SAVED = 50, 10

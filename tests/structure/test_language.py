@@ -25,7 +25,7 @@ RIDDLES = {
     "Of", "What", "Whether", "Where", "As", "With", "By", "From", "That", "Those", "How", "Under", "At", "None",
     "One", "All", "Every", "If", "Unless", "Such", "Who", "Whose", "Which",
 }  # fmt: skip
-PAGE_KEYS = {"live/parts.py": {"shown"}}
+PAGE_KEYS = {"extensions/served_page/live/parts.py": {"shown"}}
 """Fields that pages read by their name."""
 SHORT = 10
 """Lines of a private function from which it may have a docstring."""

@@ -8,11 +8,11 @@ from importlib import import_module
 from pathlib import Path
 
 from laufruhe.cli.screen import Request, complain, is_quiet, timed
-from laufruhe.live import live_model
 from laufruhe.present.pictures import PICTURES
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
+from laufruhe.report.section import controls_of
 from laufruhe.report.tables import write_tables
 from laufruhe.report.web_page import template, write_pages
 from laufruhe.solvers.result import Result, Status
@@ -30,7 +30,7 @@ def write_results(
     say("writing tables")
     with timed(result.timing, "tables"):
         write_tables(result, stage)
-    page_model = live_model(result.problem, result)
+    controls = controls_of(result)
     with shown_in(dict(result.problem.shown_units)):
         document = result_document(result, list(PICTURES), request.command)
     if request.kinds:
@@ -42,7 +42,7 @@ def write_results(
             import_module("laufruhe.report.screen")
         pictures = wait_for_pictures()
     document = document.showing(pictures)
-    write_pages(stage, document, pictures, f".{request.kinds[0]}" if request.kinds else "", page_model)
+    write_pages(stage, document, pictures, f".{request.kinds[0]}" if request.kinds else "", controls)
     text = as_json(result, request.series)
     for place in filter(None, (stage / files.RESULT, copy)):
         files.write(place, text)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from laufruhe import plots
-from laufruhe.live import live_model
 from laufruhe.present.pictures import PICTURES
 from laufruhe.report import files
 from laufruhe.report.result_report import result_document
+from laufruhe.report.section import controls_of
 from laufruhe.report.web_page import as_html
 from laufruhe.solvers.result import Result
 
@@ -19,7 +19,7 @@ def write_report(result: Result, path: Path) -> None:
     pictures = {name: plots.as_svg(figure) for name, figure in plots.figures(result)}
     document = document.showing(pictures)
     if path.suffix in (".html", ".htm"):
-        files.write(path, as_html(document, pictures, live_model(result.problem, result)))
+        files.write(path, as_html(document, pictures, controls_of(result)))
         return
     files.write(path, document.as_markdown(".svg"))
     for name, svg in pictures.items():

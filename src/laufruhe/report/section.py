@@ -32,6 +32,8 @@ class Section:
         Names of tables that are also written as CSV files, as printed.
     number_tables
         Further CSV files with numbers in full precision.
+    controls
+        Function that returns what moves on the page of a result, by its names in `page.html`; None for nothing.
     """
 
     name: str
@@ -40,7 +42,13 @@ class Section:
     record: Callable[[Result], Mapping[str, Any]] | None = None
     printed: tuple[str, ...] = ()
     number_tables: NumberTables = field(default_factory=dict)
+    controls: Callable[[Result], Mapping[str, Any] | None] = lambda _: None
 
 
 EXTENSION_SECTIONS: Mapping[str, Section] = extended("sections", Section, ())
 """Sections of extensions by their names."""
+
+
+def controls_of(result: Result) -> Mapping[str, Any] | None:
+    """Return what moves on the page of a result; None for nothing."""
+    return next(filter(None, (section.controls(result) for section in EXTENSION_SECTIONS.values())), None)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup, escape
 
-from laufruhe.live import LiveModel, page_assets
 from laufruhe.present.tables import Table
 from laufruhe.report import files
 from laufruhe.report.document import Document
@@ -21,29 +20,24 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 PAGE = "page.html"
-HEADING = "Move the decisions"
 
 
-def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | None = None) -> str:
-    """Return a report as HTML with its pictures, SVG by name, and sliders where there is a live model."""
-    inline, sliders = {name: data_address(svg) for name, svg in pictures.items()}, None
-    if live is not None and (live.sliders or live.without_slider):
-        if why := live.why_not or live.too_large:
-            content: dict[str, Any] = {"sentences": (why, *live.notes)}
-        else:
-            # these texts are safe: the package makes them, and the JSON has no opening bracket
-            texts = {"model": live.as_json(), "style": page_assets()["live.css"], "script": page_assets()["live.js"]}
-            content = {name: Markup(text) for name, text in texts.items()}
-        sliders = {"heading": HEADING, **content}
-    return f"{template(PAGE).render(document=document, pictures=inline, live=sliders)}\n"
+def as_html(document: Document, pictures: Mapping[str, str], controls: Mapping[str, Any] | None = None) -> str:
+    """Return a report as HTML with its pictures, SVG by name, and controls of an extension."""
+    inline = {name: data_address(svg) for name, svg in pictures.items()}
+    return f"{template(PAGE).render(document=document, pictures=inline, live=controls)}\n"
 
 
 def write_pages(
-    folder: Path, document: Document, pictures: Mapping[str, str], ending: str, live: LiveModel | None = None
+    folder: Path,
+    document: Document,
+    pictures: Mapping[str, str],
+    ending: str,
+    controls: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a report as Markdown, whose picture files have the ending `ending`, and as a page."""
     files.write(folder / files.REPORT, document.as_markdown(ending))
-    files.write(folder / files.PAGE, as_html(document, pictures, live))
+    files.write(folder / files.PAGE, as_html(document, pictures, controls))
 
 
 def table_html(table: Table) -> str:

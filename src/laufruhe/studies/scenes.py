@@ -25,7 +25,7 @@ from laufruhe.studies.equal_power import at_equal_power
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-DISPLAY = {"report", "plots", "live", "cli"}
+DISPLAY = {"report", "plots", "cli"}
 """Folders of the package that only show answers, so that their code does not enter the fingerprint."""
 
 

@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect
 
 import laufruhe
 from browser.chromium import PATIENCE, serious
-from laufruhe.live import decided
+from laufruhe.extensions.served_page.live import decided
 from laufruhe.problem.evaluation import evaluate
 from problem_files import PROBLEMS, changed
 

@@ -22,6 +22,7 @@ from laufruhe.extensions.served_page.claims import (
     settled_claim,
 )
 from laufruhe.extensions.served_page.controls import as_typed, controls_of, offered_by
+from laufruhe.extensions.served_page.live import decided
 from laufruhe.extensions.served_page.page_problem import page_problem_of
 from laufruhe.extensions.served_page.page_state import CRANK, LATER, STAR, Edit, PageState
 from laufruhe.extensions.served_page.pareto import ParetoFront, partners, places
@@ -29,7 +30,6 @@ from laufruhe.files import edits
 from laufruhe.files.complaints import errors_in_file
 from laufruhe.files.reader import load_tables
 from laufruhe.files.toml_text import toml_text
-from laufruhe.live import decided
 from laufruhe.present.numbers import figure
 from laufruhe.present.pictures import PICTURES
 from laufruhe.problem.decision import Kind

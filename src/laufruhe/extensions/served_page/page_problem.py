@@ -13,9 +13,9 @@ from laufruhe.errors import ModelError, plural
 from laufruhe.extensions.served_page.claims import Simplification, join_phrases
 from laufruhe.extensions.served_page.drawing import drawing_of
 from laufruhe.extensions.served_page.follower import Follower, SliderOptimum, can_follow
+from laufruhe.extensions.served_page.live import live_model
 from laufruhe.extensions.served_page.pareto import partners
 from laufruhe.files.measures import EDGES
-from laufruhe.live import live_model
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends, open_kinds
 from laufruhe.problem.evaluation import Evaluation, evaluate

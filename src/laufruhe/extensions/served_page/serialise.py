@@ -11,9 +11,9 @@ from typing import Any
 from laufruhe.errors import InputError
 from laufruhe.extensions.served_page.claims import Claim, ClaimKind
 from laufruhe.extensions.served_page.controls import as_typed
+from laufruhe.extensions.served_page.live.model import sides_of
 from laufruhe.extensions.served_page.page_state import STAR, Edit
 from laufruhe.files.complaints import Refused
-from laufruhe.live.model import sides_of
 from laufruhe.present.measures import is_met
 from laufruhe.present.numbers import figure, price_of
 from laufruhe.problem.problem import Problem

@@ -18,11 +18,11 @@ from laufruhe.errors import Complaint, SolverError, printed, refused
 from laufruhe.extensions.served_page import answers
 from laufruhe.extensions.served_page.file_watcher import FileWatcher
 from laufruhe.extensions.served_page.latest_worker import LatestWorker, Superseded
+from laufruhe.extensions.served_page.live import page_assets
 from laufruhe.extensions.served_page.page_state import PageState
 from laufruhe.extensions.served_page.pareto import POINTS
 from laufruhe.extensions.served_page.transport import HttpAnswer, Server
 from laufruhe.files.complaints import Refused
-from laufruhe.live import page_assets
 from laufruhe.present.pictures import PICTURES
 
 P = ParamSpec("P")

@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 
 import ready
+from extensions.served_page.live_pages import EVERY_NORM, designs, evaluated, model_of, problem_of, with_unknown_norm
+from laufruhe.extensions.served_page.live import live_model, page_assets
+from laufruhe.extensions.served_page.live.model import reference_of
+from laufruhe.extensions.served_page.live.saving import file_number
+from laufruhe.extensions.served_page.live.section import sliders
+from laufruhe.extensions.served_page.live.signals import NORMS_OF_PAGE
 from laufruhe.files.reader import load
-from laufruhe.live import live_model, page_assets
-from laufruhe.live.model import reference_of
-from laufruhe.live.saving import file_number
-from laufruhe.live.signals import NORMS_OF_PAGE
 from laufruhe.numerics.spectrum import JUMP_OFFSET
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
@@ -25,7 +27,6 @@ from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
 from laufruhe.solvers import evaluate_only
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
-from live.pages import EVERY_NORM, designs, evaluated, model_of, problem_of, with_unknown_norm
 from problem_files import PROBLEMS
 
 
@@ -110,7 +111,7 @@ def test_sliders_have_the_units_of_the_file():
 
 
 def test_a_page_too_large_says_so(every, monkeypatch):
-    monkeypatch.setattr("laufruhe.live.parts.MAX_MB", 1e-3)
+    monkeypatch.setattr("laufruhe.extensions.served_page.live.parts.MAX_MB", 1e-3)
     assert "carries at most" in every[1].too_large
 
 
@@ -125,7 +126,7 @@ def test_a_problem_with_nothing_open_has_no_sliders():
 
 def test_headings_of_a_live_report_can_be_gone_to(every):
     result = evaluate_only(every[0])
-    page = as_html(result_document(result, ["polar"], "laufruhe"), {"polar": "<svg/>"}, every[1])
+    page = as_html(result_document(result, ["polar"], "laufruhe"), {"polar": "<svg/>"}, sliders(result))
     targets = re.findall('<h2 id="([^"]*)"', page)
     assert targets[1:3] == ["try", "pictures"]
     assert targets == re.findall('<a href="#([^"]*)"', page)
@@ -152,7 +153,7 @@ def test_what_a_star_is_decided_to_be_is_saved_from_its_result_alone():
 
 
 def test_norms_that_a_page_follows_are_those_of_its_script():
-    script = (files("laufruhe.live") / "page" / "norms.js").read_text(encoding="utf-8")
+    script = (files("laufruhe.extensions.served_page.live") / "page" / "norms.js").read_text(encoding="utf-8")
     table = script.partition("const NORMS = {")[2].partition("};")[0]
     assert {a or b for a, b in re.findall(r'^  (?:"([^"]+)"|(\w+)):', table, re.MULTILINE)} == NORMS_OF_PAGE
 
@@ -201,7 +202,7 @@ def test_a_served_page_takes_its_reference_from_its_server(every):
 
 def test_scripts_have_the_constants_of_the_package(every) -> None:
     """A page reads jumps on the same side, and judges limits with the same tolerance, as the package."""
-    text = (files("laufruhe.live") / "page" / "signals.js").read_text()
+    text = (files("laufruhe.extensions.served_page.live") / "page" / "signals.js").read_text()
     (found,) = re.findall(r"\bBEHIND = ([^,;]+)[,;]", text)
     assert float(found) == pytest.approx(JUMP_OFFSET, rel=1e-12)
     _, model = every

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from laufruhe.extensions.served_page.live import LiveModel, live_model
+from laufruhe.extensions.served_page.live.section import sliders
 from laufruhe.files.reader import load
-from laufruhe.live import LiveModel, live_model
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, lengths
 from laufruhe.numerics.norms.mean import Mean
@@ -95,7 +96,7 @@ def page_of(problem: Problem, folder: Path) -> Path:
     """A report with the live page, without pictures."""
     result = evaluate_only(problem)
     path = folder / "report.html"
-    path.write_text(as_html(result_document(result, [], "laufruhe"), {}, live_model(problem, result)), encoding="utf-8")
+    path.write_text(as_html(result_document(result, [], "laufruhe"), {}, sliders(result)), encoding="utf-8")
     return path
 
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from laufruhe.live.saving import NOT_SAVED, Saved
-from laufruhe.live.signals import Signal
+from laufruhe.extensions.served_page.live.saving import NOT_SAVED, Saved
+from laufruhe.extensions.served_page.live.signals import Signal
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.units import readable
 

@@ -3,8 +3,8 @@
 from functools import cache
 from importlib.resources import files
 
-from laufruhe.live.model import decided, live_model
-from laufruhe.live.parts import LiveModel
+from laufruhe.extensions.served_page.live.model import decided, live_model
+from laufruhe.extensions.served_page.live.parts import LiveModel
 
 __all__ = ["LiveModel", "decided", "live_model", "page_assets"]
 
@@ -16,7 +16,7 @@ PARTS = ("signals", "norms", "numbers", "design", "drawing", "figures", "control
 @cache
 def page_assets() -> dict[str, str]:
     """Return script (`window.laufruheLive`) and style of a live page, by file name."""
-    folder = files("laufruhe.live") / "page"
+    folder = files("laufruhe.extensions.served_page.live") / "page"
     parts = [(folder / f"{name}.js").read_text(encoding="utf-8") for name in PARTS]
     script = "\n".join(['"use strict";', "(() => {", *parts, "})();", ""])
     return {SCRIPT: script, STYLE: (folder / STYLE).read_text(encoding="utf-8")}

@@ -17,11 +17,11 @@ import numpy as np
 
 from laufruhe import units
 from laufruhe.errors import ModelError
+from laufruhe.extensions.served_page.live.parts import DisplayedMeasure, LiveModel, Slider, or_none
+from laufruhe.extensions.served_page.live.saving import saved_file
+from laufruhe.extensions.served_page.live.signals import NORMS_OF_PAGE, Signal, signal_of
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
-from laufruhe.live.parts import DisplayedMeasure, LiveModel, Slider, or_none
-from laufruhe.live.saving import saved_file
-from laufruhe.live.signals import NORMS_OF_PAGE, Signal, signal_of
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
