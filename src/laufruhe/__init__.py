@@ -88,6 +88,7 @@ __all__ = [
     "evaluate",
     "evaluate_many",
     "examples",
+    "identify",
     "inline",
     "load",
     "machine",
@@ -335,6 +336,34 @@ def evaluate_many(
 
     check_integer("jobs", jobs, 1)
     return tabulate(_problem(problem), designs, jobs)
+
+
+@_on_one_thread
+def identify(problem: Problem | Source) -> Any:
+    """Estimate the open numbers of a built engine from its measured orders, as the command `identify` does.
+
+    Parameters
+    ----------
+    problem
+        Problem with [[measurements]], or an argument of `load`.
+
+    Returns
+    -------
+    Object with `numbers` (a table of estimates with their intervals), `unexplained` (the share of each measurement),
+    `identified` (the problem with its numbers fixed), and `to_json`.
+
+    Raises
+    ------
+    InputError
+        If the problem or a measurement is wrong.
+    """
+    from importlib.util import find_spec
+
+    from laufruhe.extension import missing_extension
+
+    if find_spec("laufruhe.extensions.identification") is None:
+        raise ModelError(f"laufruhe.identify {'; '.join(missing_extension('identification'))}")
+    return import_module("laufruhe.extensions.identification.report").identify(_problem(problem))
 
 
 @_on_one_thread

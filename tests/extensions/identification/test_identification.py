@@ -185,3 +185,23 @@ def test_unbalances_stay_within_their_size(tmp_path: Path) -> None:
     for name in ("crank.pulley.unbalance", "crank.flywheel.unbalance"):
         assert numbers[name]["estimate"] <= 2e-3 * (1.0 + 1e-9)
     assert "is not explained" in (tmp_path / "out" / "report.md").read_text()
+
+
+def test_python_identifies_as_the_command_does(tmp_path: Path) -> None:
+    # loads are affine in what is left open, which is quick
+    problem = lr.load(READY).fix("mounts.stiffness.3").fix("reciprocating mass")
+    for csv in PROBLEMS.glob("built-twin-*.csv"):
+        shutil.copy(csv, tmp_path)
+    path = tmp_path / "twin.toml"
+    path.write_text(problem.to_toml(), encoding="utf-8")
+    answer = lr.identify(path)
+    assert CliRunner().invoke(app, ["identify", str(path), "--out", str(tmp_path / "out"), "--quiet"]).exit_code == 0
+    tmp_path /= "out"
+    told = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert json.loads(answer.to_json()) == told
+    size = answer.numbers.loc["crank.pulley.unbalance"]
+    assert size["from"] < size["estimate"] < size["to"]
+    assert answer.identified.to_toml() == (tmp_path / "identified.toml").read_text(encoding="utf-8")
+    assert dict(answer.unexplained) == {one["file"]: one["unexplained"] for one in told["measurements"]}
+    with pytest.raises(InputError, match="measurements: is missing"):
+        lr.identify(PROBLEMS / "tractor-single.toml")

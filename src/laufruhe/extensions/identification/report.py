@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,10 +29,61 @@ from laufruhe.report.table_files import write_csv
 from laufruhe.report.web_page import write_pages
 from laufruhe.units import readable, shown_in
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 NUMBERS, IDENTIFIED = "estimates.csv", "identified.toml"
 NAMES = (files.REPORT, files.PAGE, files.RESULT, NUMBERS, IDENTIFIED)
 _MUCH = 0.1
 """Unexplained share above which the report warns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Estimates of the open numbers of a problem from its measurements."""
+
+    problem: Problem
+    measurements: Sequence[Measurement]
+    answer: Estimate
+
+    @property
+    def numbers(self) -> pd.DataFrame:
+        """Estimates in SI units by name: estimate, ends of the confidence interval, unit and remark."""
+        import pandas as pd
+
+        table = _table(self.answer, is_readable=False)
+        return pd.DataFrame(table.rows, columns=list(table.head)).set_index(table.head[0])
+
+    @property
+    def unexplained(self) -> Mapping[str, float]:
+        """Share of each measurement that the estimates leave unexplained, by its file."""
+        return dict(zip((m.name for m in self.measurements), self.answer.unexplained, strict=True))
+
+    @property
+    def identified(self) -> Problem:
+        """Problem with its open numbers fixed at their estimates, and their uncertainty as tolerances."""
+        return with_estimates(self.problem, self.answer)
+
+    def to_json(self) -> str:
+        """Return the estimates as `result.json` has them."""
+        return as_json(self.problem, self.measurements, self.answer)
+
+    def __repr__(self) -> str:
+        return f"<Identification {self.problem.name}\n{self.numbers}>"
+
+
+def identify(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Identification:
+    """Return the estimates of the open numbers of a problem from its [[measurements]]; `say` reports steps."""
+    origin = problem.origin
+    rows = origin.tables.get(MEASUREMENTS.name) if origin is not None else None
+    source = Path("problem") if origin is None else origin.path
+    if not rows:
+        remedy = 'add [[measurements]] with file = "orders.csv"'
+        raise refused(MEASUREMENTS.name, "", "is missing, so there is nothing to identify numbers from", remedy, source)
+    with errors_in_file(source):
+        tables = [MeasurementTable.model_validate(table) for table in rows]
+        measurements = measurements_of(problem, tables, source.parent)
+        return Identification(problem, measurements, estimate(measurements, say))
 
 
 def identified(path: Path, out: Path | None, say: Callable[[str], None]) -> tuple[Output, Callable[[], str]]:
@@ -40,25 +92,19 @@ def identified(path: Path, out: Path | None, say: Callable[[str], None]) -> tupl
     Return a function that shows the report, and one that returns JSON.
     """
     say("reading the file")
-    tables, source = tables_of(path), display_path(path)
-    if not tables.get(MEASUREMENTS.name):
-        remedy = 'add [[measurements]] with file = "orders.csv"'
-        raise refused(MEASUREMENTS.name, "", "is missing, so there is nothing to identify numbers from", remedy, source)
-    problem = load_tables(tables, source)
-    with errors_in_file(source):
-        rows = [MeasurementTable.model_validate(table) for table in tables[MEASUREMENTS.name]]
-        measurements = measurements_of(problem, rows, path.parent)
-        answer = estimate(measurements, say)
+    source = display_path(path)
+    identification = identify(load_tables(tables_of(path), source), say)
+    problem, measurements = identification.problem, identification.measurements
     folder = out or Path("results") / f"{source.stem}-identify"
     option = "results" if out is None else "--out"
     with files.staged(files.FileSet(folder, option, "identify", NAMES)) as stage:
         with shown_in(dict(problem.shown_units)):
-            document = Document(problem.title, tuple(_blocks(problem, measurements, answer, str(path))))
-        text = as_json(problem, measurements, answer)
-        write_csv(_table(answer, is_readable=False), stage / NUMBERS)
+            document = Document(problem.title, tuple(_blocks(problem, measurements, identification.answer, str(path))))
+        text = identification.to_json()
+        write_csv(_table(identification.answer, is_readable=False), stage / NUMBERS)
         files.write(stage / files.RESULT, text)
         write_pages(stage, document, {}, ".svg")
-        files.write(stage / IDENTIFIED, with_estimates(problem, answer).to_toml())
+        files.write(stage / IDENTIFIED, identification.identified.to_toml())
     return lambda stream: show_document(document, stream, folder, files.PAGE), lambda: text
 
 
