@@ -101,7 +101,10 @@ def test_the_documentation_has_no_serious_finding(name: str, page: Page) -> None
 
 def test_only_what_is_wider_than_the_screen_says_so(shown: Page) -> None:
     """On a phone each picture and wide table says that it moves sideways."""
+    shown.emulate_media(media="screen")
     shown.set_viewport_size({"width": 390, "height": 800})
+    # a timeline of scrolling is measured with the next frame
+    shown.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     words = "part => parseFloat(getComputedStyle(part, '::before').fontSize) > 0"
     moved = "part => part.scrollWidth > part.clientWidth"
     said, wide = (shown.evaluate(f"[...document.querySelectorAll('.scroll')].map({f})") for f in (words, moved))
