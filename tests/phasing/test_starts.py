@@ -65,7 +65,7 @@ def test_a_throw_between_bounds_needs_nothing_beside_it(tmp_path):
     engine = "throws = [0, 180, 180, { between = [0, 360] }]\nfiring_order = [1, 3, 4, 2]"
     even = "throws = [0, 180, 180, 0]\nfiring_order = [1, 3, 4, 2]"
     open_one, even = (
-        engines.problem(tmp_path, 4, "four-stroke", own, "", MOUNT_FORCE, samples=96) for own in (engine, even)
+        engines.problem(tmp_path, 4, "four-stroke", own, "", MOUNT_FORCE, samples=48) for own in (engine, even)
     )
     result = solve(open_one)
     assert result.objective.value <= objective_value(even, evaluate(even)) * (1.0 + 1e-6)
