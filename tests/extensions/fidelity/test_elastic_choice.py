@@ -110,7 +110,7 @@ def _keeps_its_word(problem: Problem, tolerance: float) -> None:
 def test_modes_and_motion_are_really_dropped() -> None:
     """All three cases occur: modes left out, no motion at all, modes that nothing excites."""
     missing = {"modes", "motion"}
-    for seed in range(AUTOMATIC):
+    for seed in range(6, AUTOMATIC):
         chosen = choose(random_elastic_problem(random.Random(700 + seed), gas=False), 3e-1).fidelity
         missing -= {"modes"} if chosen.modes is not None else set()
         missing -= {"motion"} if chosen.mounts == "rigid" else set()
