@@ -13,7 +13,7 @@ CONES = Method(
     "second-order cones of electric torque",
     {Kind.UNBALANCE: _AFFINE, Kind.PISTON: _AFFINE, ELECTRIC_TORQUE: _AFFINE},
     ProofStrength.EXACT,
-    imported("laufruhe.solvers.cones.unbalances:solve_polished"),
+    imported("laufruhe.solvers.cones.unbalances:solve_unbalances"),
     refines_fidelity=True,
     before="cones over boxes of places",
     proves="the optimum",
