@@ -90,7 +90,8 @@ def answers() -> Iterator[Callable[[Sequence[str]], Path]]:
 
             return run
 
-        yield lambda names: once(f"without-{'-'.join(names)}", fill(names))
+        # the name of a file is short, however many folders there are
+        yield lambda names: once(f"without-{names[0] if len(names) == 1 else 'all'}", fill(names))
         server.stdin.close()
         server.wait()
 
