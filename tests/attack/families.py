@@ -263,11 +263,10 @@ def asked(rng: Generator, table: Table, channels: tuple[str, ...] = LOADS, norms
         found["orders"] = [1, 2] if rng.random() < 0.5 else [int(rng.choice([1, 2]))]
     if len(table["operating_points"]) > 1 and rng.random() < 0.3:
         found["operating_points"] = ["p1"]
-    if channel.startswith("mount"):
-        if rng.random() < 0.3:
-            found["mounts"] = ["m0", "m2"]
-        if rng.random() < 0.3:
-            found["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.0, 2.0, 3)]
+    if channel.startswith("mount") and rng.random() < 0.3:
+        found["mounts"] = ["m0", "m2"]
+    if (channel.startswith("mount") or channel == "shaking force") and rng.random() < 0.3:
+        found["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.0, 2.0, 3)]
     return found
 
 

@@ -218,7 +218,7 @@ class Scene:
         found = [plain_mounts.over_cycle(c) for c in self.coefficients(channel, asked.get("orders"))]
         signal = np.stack(found).transpose(0, 2, 1, 3)
         if channel in ON_BLOCK:
-            return signal
+            return signal * np.array(asked.get("direction_weights", 1.0))
         names = [place.get("name", f"mount {k + 1}") for k, place in enumerate(self.table["mounts"]["places"])]
         places = [names.index(name) for name in asked.get("mounts", names)]
         return signal[:, places] * np.array(asked.get("direction_weights", [1.0, 1.0, 1.0]))

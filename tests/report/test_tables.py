@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import laufruhe
@@ -16,7 +17,7 @@ from laufruhe.report.document import Bullets, Document, Paragraph
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show, show_document
 from laufruhe.report.sections import elastic, loads, tables_of
-from laufruhe.report.wording import explained, headline, why_star
+from laufruhe.report.wording import added_loads, explained, headline, why_star
 from laufruhe.solvers import Result
 from laufruhe.studies.text import marked_table
 from laufruhe.units import readable, shown_in
@@ -255,6 +256,69 @@ def test_rocking_couples_are_shown_by_axis() -> None:
     couples = {row[0]: row[-1] for row in whole.rows}
     assert all(row[1].strip() == couples[row[0]].strip() for row in by_axis.rows if row[0] in ("1", "2"))
     assert len(loads.orders(laufruhe.evaluate(laufruhe.load("tractor-four-front-force")))) == 1
+
+
+def test_shaking_forces_are_shown_by_axis_where_these_differ() -> None:
+    """Half of the reciprocating mass opposite to the throw: the forces of order 1 along both axes are equal."""
+    half, most = (
+        loads.orders(laufruhe.evaluate(laufruhe.load(_OPEN_FACTOR).with_values({"web.balance_factor": k})))
+        for k in (0.5, 0.8)
+    )
+    assert all(table.title.startswith("Shaking force by axis") for table in (half[1], most[1]))
+    (_, across, up), *rest = most[1].rows
+    assert float(across) == pytest.approx(4.0 * float(up), rel=1e-3)
+    assert rest[0][1].strip() == "0"
+    assert half[1].rows[0][1] == half[1].rows[0][2]
+    assert len(loads.orders(laufruhe.evaluate(laufruhe.load("tractor-four-front-force")))) == 1
+
+
+def test_direction_weights_of_the_objective_are_in_the_headline() -> None:
+    """Weights w along z on a single: the best balance factor is w^2 / (1 + w^2), from k^2 + w^2 (1 - k)^2."""
+    result = laufruhe.solve(_OPEN_FACTOR.replace('force" }', 'force", direction_weights = [1, 1, 2] }'))
+    assert headline(result).startswith("RMS shaking force with direction weights 1, 1, 2 falls from")
+    (factor,) = result.decisions
+    assert factor.value == pytest.approx(0.8, abs=1e-6)
+
+
+_FLAT = """
+title = "Flat twin"
+operating_points = [{ speed = "3000 rpm" }]
+main_bearings = [{ name = "front", x = "-80 mm" }, { name = "rear", x = "80 mm" }]
+objective = { minimise = "maximum main-bearing force", bearings = ["front"] }
+[engine]
+layout = "boxer"
+cycle = "four-stroke"
+stroke = "70 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.5 kg"
+rotating_mass = "0.5 kg"
+firing_order = [1, 2]
+cylinder_spacing = "100 mm"
+bank_stagger = "30 mm"
+[[counterweights]]
+name = "web"
+opposite_throw = 1
+angle = 180
+radius = "40 mm"
+mass = { between = ["0 g", "900 g"] }
+"""
+
+
+def _first_order(result: Result) -> np.ndarray:
+    wrench = result.final.loads[0].wrench
+    return np.asarray(wrench.coefficients[round(1.0 / float(wrench.base)), 1:3])
+
+
+def test_a_design_that_adds_a_free_force_says_so() -> None:
+    result = laufruhe.solve(_FLAT)
+    force = float(np.abs(_first_order(result)).max())
+    assert force > 500.0
+    (text,) = added_loads(result)
+    assert f"adds a shaking force of order 1, {force:.4g} N, that the initial design does not have" in text
+    limit = 'constraints = [{ limit = "rms shaking force", max = "1 N" }]'
+    limited = laufruhe.solve(_FLAT.replace("[engine]", f"{limit}\n[engine]"))
+    assert not added_loads(limited)
+    assert np.abs(_first_order(limited)).max() < 1.01
 
 
 def test_modes_that_no_load_moves_are_named() -> None:

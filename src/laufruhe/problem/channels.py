@@ -37,9 +37,8 @@ OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 # keys of a measure in a file that may narrow a load, by the place where the load acts
 ON_BLOCK = ("operating_points", "orders", "alternating")
 AT_WEBS = (*ON_BLOCK, "webs")
-AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
-    (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
-)
+OF_VECTOR = (*ON_BLOCK, "direction_weights")
+AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = ((*OF_VECTOR, at) for at in ("mounts", "bearings", "cylinders"))
 OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
@@ -490,7 +489,8 @@ def _on_block(name: str, unit: str, part: slice, depends_on_gas: bool = False) -
     def signal(loads: PointLoads) -> Spectrum:
         return loads.wrench.mapped(lambda wrench: wrench[:, None, part])
 
-    return LoadChannel(name, unit, signal=signal, part=part, depends_on_gas=depends_on_gas, is_block_load=True)
+    keys = OF_VECTOR if part == slice(0, 3) else ON_BLOCK
+    return LoadChannel(name, unit, keys, signal=signal, part=part, depends_on_gas=depends_on_gas, is_block_load=True)
 
 
 def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
@@ -531,7 +531,7 @@ def _of_places(
 
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
 RESULTANT_MOUNT_FORCE = LoadChannel(
-    "resultant mount force", "N", needs=Needs.MOUNTS, is_block_load=True,
+    "resultant mount force", "N", OF_VECTOR, Needs.MOUNTS, is_block_load=True,
     signal=lambda loads: MOUNT_FORCE.signal(loads).mapped(lambda values: values.sum(axis=1, keepdims=True)),
 )  # fmt: skip
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from laufruhe.numerics.exact_angles import as_turn, reduced_turn
-from laufruhe.present.measures import breaks_a_limit, has_firing, is_changed
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.present.measures import breaks_a_limit, hardest_point, has_firing, is_changed
 from laufruhe.present.numbers import figure, number, percent, share, trimmed, with_unit
 from laufruhe.present.static_load import static_sentence
 from laufruhe.problem.plausibility import simultaneous_firings
@@ -19,6 +22,8 @@ NO_CHANGE = 5e-4
 NO_BOUND = "no useful lower bound was found in the time given"
 NEGLIGIBLE = 1e-9
 """Relative error of the objective that is not stated as a number."""
+ADDED = 0.01
+"""Share of the force of one piston or weight from which a load is one that a design adds."""
 LARGE_RESIDUAL = 1e-3
 """Residual above which the optimality conditions count as not met."""
 
@@ -31,6 +36,10 @@ def headline(result: Result) -> str:
     if o is None:
         return "The initial design was evaluated; there is no objective."
     name = f"RMS{o.name[3:]}" if o.name.startswith("rms ") else o.name[:1].upper() + o.name[1:]
+    weights = [term.measure.direction_weights for term in result.problem.objective]
+    if any(weights):
+        values = ", ".join(f"{weight:g}" for weight in weights[0] or ())
+        name += f" with direction weights{f' {values}' if len(set(weights)) == 1 else ''}"
     if not is_changed(result):
         return f"{name} of the initial design: {figure(o.value, o.unit)}."
     if math.isinf(o.initial):
@@ -51,7 +60,37 @@ def headline(result: Result) -> str:
 def details(result: Result) -> list[str]:
     """Return the sentences below the headline: attainable limits, firing order, comparison of crank stars."""
     static = "" if result.objective is None else static_sentence(result.problem, result.final)
-    return [sentence for sentence in (*attainable(result), static, fired(result), why_star(result)) if sentence]
+    sentences = (*attainable(result), static, *added_loads(result), fired(result), why_star(result))
+    return [sentence for sentence in sentences if sentence]
+
+
+def added_loads(result: Result) -> list[str]:
+    """Return a sentence for each free force and couple of an order that the initial design does not have.
+
+    A problem that minimises or limits a load on the block counts them, and has no such sentence.
+    """
+    if not is_changed(result) or any(m.is_load and m.load.is_block_load for m in result.problem.measures):
+        return []
+    k, engine = hardest_point(result), result.final.engine
+    sizes = [part.reciprocating_mass * part.crank_radius for part in engine.slider_cranks]
+    sizes += [abs(rotor.unbalance) for rotor in engine.rotors]
+    force = max(sizes) * result.problem.points[k].speed ** 2
+    length = float(np.ptp([*(part.x for part in engine.slider_cranks), *(rotor.x for rotor in engine.rotors)]))
+    before, after = (design.loads[k].wrench for design in (result.initial, result.final))
+    texts = []
+    for name, unit, part, scale in (
+        ("shaking force", "N", slice(0, 3), force), ("rocking couple", "N m", slice(4, 6), force * length or math.inf),
+    ):  # fmt: skip
+        old, new = (order_amplitude(wrench.coefficients[:, part]) for wrench in (before, after))
+        count = min(len(old), len(new))
+        added = np.flatnonzero((new[:count] > ADDED * scale) & (old[:count] < ADDED * new[:count]))
+        if len(added):
+            j = int(added[np.argmax(new[added])])
+            texts.append(
+                f"The design adds a {name} of order {j * float(after.base):g}, {figure(float(new[j]), unit)}, that "
+                f"the initial design does not have; a limit on 'rms {name}' prevents it."
+            )
+    return texts
 
 
 def attainable(result: Result) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import starmap
 
 import numpy as np
@@ -93,11 +94,18 @@ def orders(result: Result) -> list[Table]:
         return []
     names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
     whole = _orders(result, names, _amplitudes, "Orders")
-    by_axis = _orders(result, ("pitching, about y", "yawing, about z"), _rocking, "Rocking couple by axis")
-    k = hardest_point(result)
-    moments = [moment_orders(design.loads[k].wrench) for design in evaluations_with_loads(result)]
-    rolling, rocking = (max(float(pair[j].max()) for pair in moments) for j in range(2))
-    return [whole, by_axis] if rocking > SHARE * rolling else [whole]
+    tables, k = [whole], hardest_point(result)
+    wrenches = [design.loads[k].wrench for design in evaluations_with_loads(result)]
+    forces = [np.abs(wrench.coefficients[:, 1:3]) for wrench in wrenches]
+    # a force that turns, or acts along one axis, is that of the table above
+    if any(min(f.max(axis=0).min(), np.ptp(f, axis=1).max()) > SHARE * f.max() for f in forces):
+        names = ("horizontal force (y)", "vertical force (z)")
+        tables.append(_orders(result, names, partial(_components, 1), "Shaking force by axis"))
+    rolling, rocking = (max(float(moment_orders(wrench)[j].max()) for wrench in wrenches) for j in range(2))
+    if rocking > SHARE * rolling:
+        names = ("pitching, about y", "yawing, about z")
+        tables.append(_orders(result, names, partial(_components, 4), "Rocking couple by axis"))
+    return tables
 
 
 def _orders(
@@ -122,12 +130,12 @@ def _orders(
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
     selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
     note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
-    units = f"{unit}, N m" if "shaking force" in names else "N m"
+    units = ", ".join(dict.fromkeys(unit if "force" in name else "N m" for name in names))
     return Table(head, rows, title=f"{title} at {result.problem.points[k].name} [{units}]", note=note)
 
 
-def _rocking(loads: PointLoads) -> list[Array]:
-    return [np.abs(loads.wrench.coefficients[:, component]) for component in (4, 5)]
+def _components(first: int, loads: PointLoads) -> list[Array]:
+    return [np.abs(loads.wrench.coefficients[:, component]) for component in (first, first + 1)]
 
 
 def _amplitudes(loads: PointLoads) -> list[Array]:
