@@ -318,7 +318,8 @@ def test_on_a_phone_the_optimum_stays_in_sight_and_groups_are_folded(shown: Page
 def test_on_a_phone_pictures_keep_their_letters_and_are_moved(shown: Page) -> None:
     shown.set_viewport_size({"width": 390, "height": 844})
     shown.locator("#picture").click()
-    expect(shown.locator("#pictures-state")).to_contain_text("5 of 5")
+    # all of them, however many a result has
+    expect(shown.locator("#pictures-state")).to_contain_text(re.compile(r"^(\d+) of \1$"))
     image = shown.locator("#drawn img").first
     image.scroll_into_view_if_needed()
     assert image.evaluate("(drawn) => drawn.clientWidth") > 600
