@@ -217,11 +217,14 @@ def test_open_and_changed_problems_are_refused(read: Callable[..., Problem], tmp
 
 
 def test_report_shows_rows_and_counts(read: Callable[..., Problem]) -> None:
-    result = solve(read("[parts_price]\ntotal = 5\n"))
+    result = solve(read('[parts_price]\ntotal = 5\n[[constraints]]\nlimit = "parts price"\nmax = 7\n'))
     chosen, ranked = SECTION.tables(result)
     row = outcome_of(result).solved[0].rows[0]
     assert list(chosen.rows[0][:2]) == ["weight", ["small", "middle", "large"][row]]
     assert len(ranked.rows) == len(outcome_of(result).solved)
+    # the price of a row is above the limit
+    assert "| small | - | - | infeasible |" in ranked.as_markdown()
+    assert "large" in chosen.as_markdown()
     assert SECTION.record is not None
     record = SECTION.record(result)
     assert record["combinations"] == 3

@@ -39,7 +39,7 @@ def _tables(result: Result) -> list[Table]:
     )
     ranked = _combinations(result)
     best = [
-        [figure(cell, unit, 6) if isinstance(cell, float) and math.isfinite(cell) else cell for cell in row]
+        [cell if isinstance(cell, str) else figure(cell, unit, 6) if math.isfinite(cell) else "-" for cell in row]
         for row in ranked.rows[:RANKED]
     ]
     return [
