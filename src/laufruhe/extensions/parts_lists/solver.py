@@ -19,6 +19,7 @@ import numpy as np
 
 from laufruhe.errors import InputError, ModelError, SolverError, counted
 from laufruhe.extensions.parts_lists.lists import RANKED, Choices, Column, Combination, Outcome, Subset, with_rows
+from laufruhe.extensions.parts_lists.price import PARTS_PRICE, price_of
 from laufruhe.files.complaints import errors_in_file
 from laufruhe.files.reader import load_tables
 from laufruhe.problem.decision import Decision
@@ -84,7 +85,7 @@ def solve_choices(problem: Problem, decide: methods.Decide, max_nodes: int = MAX
     # a walk may refute the bound
     best, bound = checked, bound if checked is best else 0.0
     assert best.objective is not None
-    value, kinds = best.objective.value, (Proof.GLOBAL, Proof.WITHIN_GAP)
+    value, kinds = best.objective.value + search.price, (Proof.GLOBAL, Proof.WITHIN_GAP)
     is_exact = all(known.proof in kinds or known.bound >= value for known in outcome.solved)
     is_exact = is_exact and bound > (1.0 - USELESS_GAP) * value
     certificate = make_certificate(
@@ -92,11 +93,12 @@ def solve_choices(problem: Problem, decide: methods.Decide, max_nodes: int = MAX
         ProofStrength.EXACT if is_exact else ProofStrength.RELAXED,
         best.certificate.kkt_residual if best.certificate is not None else 0.0, outcome.words,
         # the bound of the best combination is above its value by errors of sampling at most
-        max(_bound_of(best) - value, 0.0),
+        max(_bound_of(best) + search.price - value, 0.0),
     )  # fmt: skip
     extras = tuple(replace(extra, outcome=outcome) for extra in problem.extras if isinstance(extra, Choices))
     return replace(
-        best, problem=replace(best.problem, extras=extras), initial=initial, timing=timing, certificate=certificate,
+        best, problem=replace(best.problem, extras=extras, objective=problem.objective), initial=initial,
+        timing=timing, certificate=certificate,
         status=Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
         message="; ".join(filter(None, (best.message, faults))),
@@ -124,6 +126,7 @@ class _Search(BranchAndBound[Subset]):
             raise ModelError(f"[[choices]] has {self.whole:,} combinations, more than {MAX_WHOLE:,}; shorten the lists")
         self.solved: dict[tuple[int, ...], Combination] = {}
         self.best: Result | None = None
+        self.price = 0.0
         self.values, self.faults = list[float](), list[str]()
 
     def problem_of(self, subset: Subset) -> Problem:
@@ -198,19 +201,19 @@ class _Search(BranchAndBound[Subset]):
             return self.solved[rows]
         value, bound, proof, reason = math.inf, 0.0, "not solved", ""
         try:
-            result = self.decide(self.problem_of(tuple((row,) for row in rows)))
+            result, price = self._decided(self.problem_of(tuple((row,) for row in rows)))
         except _UNSOLVED as error:
             reason = str(error)
         else:
-            bound, proof = _bound_of(result), str(result.status)
+            bound, proof = _bound_of(result) + price, str(result.status)
             if result.status.has_design and result.objective is not None:
-                value, certificate = result.objective.value, result.certificate
+                value, certificate = result.objective.value + price, result.certificate
                 proof = str(Proof.GLOBAL if certificate is None else certificate.kind)
-                witness = Witness(np.array(rows), value, lambda: _upper_value(result))
+                witness = Witness(np.array(rows), value, lambda: _upper_value(result) + price)
                 witness.check(self.what, below)
                 bisect.insort(self.values, value)
                 if value < self.value:
-                    self.best, self.value, self.witness = result, value, witness
+                    self.best, self.price, self.value, self.witness = result, price, value, witness
             elif result.status is not Status.INFEASIBLE:
                 reason = result.message
         if reason:
@@ -225,13 +228,23 @@ class _Search(BranchAndBound[Subset]):
             return 0.0
         try:
             problem = self._relaxed(subset)
-            result = None if problem is None else self.decide(problem)
+            result, price = (None, 0.0) if problem is None else self._decided(problem)
         except _UNSOLVED:
             # an error proves nothing
-            result = None
+            return 0.0
+        bound = 0.0 if result is None else _bound_of(result) + price
         if result is not None and result.status.has_design:
-            self.solve(self._nearest(subset, result), _bound_of(result))
-        return 0.0 if result is None else _bound_of(result)
+            self.solve(self._nearest(subset, result), bound)
+        return bound
+
+    def _decided(self, problem: Problem) -> tuple[Result, float]:
+        """Return the result of a problem without its terms of the price, which nothing open changes, and their sum."""
+        terms = [term for term in problem.objective if term.measure.channel is PARTS_PRICE]
+        others = tuple(term for term in problem.objective if term not in terms)
+        if not terms or not others:
+            return self.decide(problem), 0.0
+        price = sum(term.weight for term in terms) * price_of(problem.engine)
+        return self.decide(replace(problem, objective=others)), price
 
     def _relaxed(self, subset: Subset) -> Problem | None:
         """Return the problem of a subset, with limits wider by the violation that designs may have.
