@@ -238,7 +238,7 @@ class _Search(BranchAndBound[Subset]):
         return bound
 
     def _decided(self, problem: Problem) -> tuple[Result, float]:
-        """Return the result of a problem without its terms of the price, which nothing open changes, and their sum."""
+        # result without terms of the price, which nothing open changes, and their sum
         terms = [term for term in problem.objective if term.measure.channel is PARTS_PRICE]
         others = tuple(term for term in problem.objective if term not in terms)
         if not terms or not others:
