@@ -79,6 +79,11 @@ class AffineNorm:
                     return slope.reshape(*self.constant.shape, len(basis)), basis
         return self.slope, np.eye(n)
 
+    def coarser(self, factor: int) -> AffineNorm:
+        """Return the norm with every `factor`-th sample only; `factor` divides the samples of a signal."""
+        grid = replace(self.grid, weights=factor * self.grid.weights[::factor], steps=self.grid.steps // factor)
+        return replace(self, constant=self.constant[::factor], slope=self.slope[::factor], grid=grid)
+
     def rows(self, x: Array) -> Array:
         """Return the load rows V0 + B x, shape (k, d)."""
         moved = self.slope.reshape(self.constant.size, len(x)) @ x

@@ -55,13 +55,11 @@ class BatchNorm:
         """The same norm at fewer samples, fewest first."""
         if self.source is None or self.source.grid.kinks:
             return ()
-        steps, rows, weights = self.source.grid.steps, feature_rows(self.source), self.source.grid.weights
-        norms, count = list[BatchNorm](), 0.0
+        norms, count, steps = list[BatchNorm](), 0.0, self.source.grid.steps
         for samples in (n for n in range(FEWEST, steps) if steps % n == 0):
             if samples >= GROWTH * count:
-                count, times = samples, steps // samples
-                grid = Grid(times * weights[::times], samples)
-                norms.append(BatchNorm(self.norm, np.ascontiguousarray(rows[:, :, ::times]), grid))
+                count, norm = samples, self.source.coarser(steps // samples)
+                norms.append(BatchNorm(self.norm, np.ascontiguousarray(feature_rows(norm)), norm.grid))
         return tuple(norms)
 
     def values_within(self, tolerance: float, features: Array, threads: int = 1) -> Array:

@@ -196,16 +196,9 @@ class MountedLoads:
 
 def coarser(problem: AffineProblem, factor: int) -> AffineProblem:
     """Return a coarser program, whose norms have every `factor`-th sample only."""
-
-    def coarser_norm(norm: AffineNorm) -> AffineNorm:
-        # masses have no samples
-        if norm.grid.steps != problem.samples or problem.samples % factor:
-            return norm
-        rows = slice(0, None, factor)
-        grid = replace(norm.grid, weights=norm.grid.weights[rows] * factor, steps=norm.grid.steps // factor)
-        return replace(norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=grid)
-
+    # masses have no samples
     terms, limits = (
-        tuple((number, coarser_norm(norm)) for number, norm in pairs) for pairs in (problem.terms, problem.limits)
+        tuple((number, norm.coarser(factor) if norm.grid.steps == problem.samples else norm) for number, norm in pairs)
+        for pairs in (problem.terms, problem.limits)
     )
     return replace(problem, terms=terms, limits=limits, samples=problem.samples // factor)

@@ -15,7 +15,6 @@ from laufruhe.extensions.sizes.boxes import MAX_BOXES, SizeBoxes, divided_sizes
 from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.numerics.norms import Grid
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -139,12 +138,7 @@ def solve_cone_program(program: AffineProblem, exactly: bool = False) -> tuple[A
 def _coarser(norm: AffineNorm, steps: int) -> AffineNorm:
     grid = norm.grid
     stride = max((n for n in range(1, grid.steps // steps + 1) if grid.steps % n == 0), default=1)
-    if not norm.norm.averages or grid.kinks or stride == 1:
-        return norm
-    weights = stride * grid.weights[::stride]
-    return replace(
-        norm, constant=norm.constant[::stride], slope=norm.slope[::stride], grid=Grid(weights, grid.steps // stride)
-    )
+    return norm.coarser(stride) if norm.norm.averages and not grid.kinks and stride > 1 else norm
 
 
 def check_acts(model: SizeModel) -> None:
