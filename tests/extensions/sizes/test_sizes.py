@@ -286,7 +286,6 @@ def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        (changed(TEXT, "throws = [0]", 'throws = [{ between = [0, 90] }]'), "fixed throws|engine.throws"),
         (TEXT + '[[counterweights]]\nname = "b"\nbalance_factor = 0.5\n', "counts masses that follow from sizes"),
         (changed(TEXT, "throws = [0]", 'throws = [0]\n[engine.nothing]'), "nothing"),
         (changed(TEXT, '[objective]', 'bolts = { diameter = { between = ["5 mm", "9 mm"] } }\n[objective]'),
