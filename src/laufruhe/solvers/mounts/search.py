@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over, timed_rounds
 from laufruhe.numerics.progress import report_progress
-from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
@@ -21,7 +20,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
 from laufruhe.solvers.mounts.starts import StartPoint, design_at_start, evaluate_design_at, start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct_optima, is_explored
-from laufruhe.solvers.smooth.nonlinear import StopWhen, run_all_starts, solve_nonlinear
+from laufruhe.solvers.smooth.nonlinear import StopWhen, solve_nonlinear
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 # largest relative violation of a limit by a feasible result
@@ -32,9 +31,9 @@ SAME = 1e-6
 MAX_MARGINS = 6
 # violation of a limit that a peak between samples may cause
 NEAR = 0.05
-# iterations of a search, and number of local optima from whose neighbourhood searches start again
+# iterations of a search, and number of local optima that are searched again with tighter limits
 ITERATIONS = 100
-MAX_AROUND = 3
+MAX_TIGHTENED = 3
 # local optima of a search that are refined with exact simulations
 MAX_REFINED = 1
 # iterations of a search that simulates in every step
@@ -42,8 +41,6 @@ SIMULATED_ITERATIONS = 60
 # share of the objective's unit below which a search is repeated in a smaller unit, and number of repetitions
 SMALL = 1e-2
 MAX_SIZES = 3
-# standard deviation of starts around a local optimum, relative to its numbers or their range
-SPREAD = 0.4
 # deviation of start throws from their crank star [rad]
 THROW_DEVIATION = 0.02
 
@@ -183,26 +180,13 @@ class MountSearch:
         return self.best is not None and self.best.design.violation <= SLACK
 
     def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
-        """Search for better mounts from start points, then from random points around the best local optima."""
-        problem, joint = self.problem, self.joint
-        generator = np.random.default_rng(problem.search.seed)
+        """Search for better mounts from start points."""
+        joint, generator = self.joint, np.random.default_rng(self.problem.search.seed)
         starts = [
             joint.start(mounts, columns, self._perturbed_throws(generator, k))
             for k, (mounts, columns) in enumerate(points)
         ]
-        optima = self._solve(starts, self._is_explored)
-        centres = distinct_optima(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MAX_AROUND]
-        if centres and len(points) > 1 and not self._is_explored(optima) and not is_time_over():
-            low, high = real_bounds(problem.mount_decisions)
-            starts = []
-            for k in range(max(len(points) // 2, 1)):
-                x = centres[k % len(centres)].x
-                centre, columns = _split(joint, x)
-                mounts = centre + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(centre))
-                starts.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.throw_deviations(x)))
-            additional_optima = self._solve(starts, run_all_starts, len(points))
-            optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in additional_optima))
-        self._evaluate_optima(optima)
+        self._evaluate_optima(self._solve(starts, self._is_explored))
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
         return SmoothProgram(self.problem, self._size, margin, self.moves, coarser=self._coarser)
@@ -211,12 +195,8 @@ class MountSearch:
     def _iterations(self) -> int:
         return ITERATIONS if self.joint.program.external is None else SIMULATED_ITERATIONS
 
-    def _solve(
-        self, starts: Sequence[Array], stop_when: StopWhen | None = None, known: int = 0
-    ) -> tuple[LocalOptimum, ...]:
-        return solve_nonlinear(
-            self.joint.program, starts, self._workers, self._iterations, stop_when=stop_when, previous_starts=known
-        )
+    def _solve(self, starts: Sequence[Array], stop_when: StopWhen | None = None) -> tuple[LocalOptimum, ...]:
+        return solve_nonlinear(self.joint.program, starts, self._workers, self._iterations, stop_when=stop_when)
 
     def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
         return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
@@ -266,7 +246,7 @@ class MountSearch:
             result for k, result in enumerate(by_value)
             if k == 0 or abs(values[k] - values[k - 1]) > 1e-3 * abs(values[k - 1])
         ]  # fmt: skip
-        for result in distinct_results[:MAX_AROUND]:
+        for result in distinct_results[:MAX_TIGHTENED]:
             best = self.best
             if best is not None and best.design.violation <= FEASIBLE and result.design.value >= best.design.value:
                 continue

@@ -120,7 +120,6 @@ def solve_nonlinear(
     max_iterations: int = 500,
     max_seconds: float = 60.0,
     stop_when: StopWhen | None = None,
-    previous_starts: int = 0,
 ) -> tuple[LocalOptimum, ...]:
     """Return the local optima of a multistart search, the best usable one first.
 
@@ -138,8 +137,6 @@ def solve_nonlinear(
         Limits of every start and stage.
     stop_when
         Return True if the ends of the first stage so far are sufficient; None runs all starts.
-    previous_starts
-        Number of starts that the same program ran before.
 
     Raises
     ------
@@ -147,7 +144,7 @@ def solve_nonlinear(
         If worker processes die repeatedly.
     """
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
-    task = _task(program, max_iterations, max_seconds, previous_starts + len(points) >= WORTH_EXPANDING)
+    task = _task(program, max_iterations, max_seconds, len(points) >= WORTH_EXPANDING)
     with ExitStack() as stack:
         if stop_when is None:
             optima = _run_first_stage(task, points, workers, None, stack)[0]
