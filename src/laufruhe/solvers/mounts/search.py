@@ -180,7 +180,6 @@ class MountSearch:
         return self.best is not None and self.best.design.violation <= SLACK
 
     def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
-        """Search for better mounts from start points."""
         joint, generator = self.joint, np.random.default_rng(self.problem.search.seed)
         starts = [
             joint.start(mounts, columns, self._perturbed_throws(generator, k))
