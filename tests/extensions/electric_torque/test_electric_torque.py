@@ -267,6 +267,24 @@ def test_torques_and_unbalances_are_proven_together_at_each_operating_point() ->
     assert not faults_of(figure(result, "torque"))
 
 
+@pytest.mark.parametrize("given", [
+    {"orders": [1, 1.5]},
+    {"orders": [], "harmonics": [{"order": 1.5, "torque": "60 N m", "angle": 95}, {"order": 1, "torque": "30 N m"}]},
+])  # fmt: skip
+def test_open_stars_beside_a_torque_are_those_of_an_enumeration(given: dict[str, Any]) -> None:
+    engine = {"throws": "open", "firing_order": "open", "cylinders": 3}
+    whole = laufruhe.solve(problem_of([machine(**given)], "rms mount force", engine=engine))
+    values = []
+    for throws, order in (([0, 240, 120], [1, 3, 2]), ([0, 120, 240], [1, 2, 3])):
+        star = {"throws": throws, "firing_order": order}
+        result = laufruhe.solve(problem_of([machine(**given)], "rms mount force", engine=star))
+        assert result.objective is not None
+        values.append(result.objective.value)
+    assert is_proven(whole)
+    assert whole.objective is not None
+    assert whole.objective.value == pytest.approx(min(values), rel=1e-6)
+
+
 def test_a_flywheel_is_decided_beside_the_torque() -> None:
     flywheel = {"inertia": {"between": ["0.1 kg m^2", "2 kg m^2"]}}
     terms = [{"quantity": "rms mount force", "weight": 1.0}, {"quantity": "flywheel inertia", "weight": 10.0}]
