@@ -48,7 +48,7 @@ def read(tmp_path: Path) -> Callable[..., Problem]:
     return of
 
 
-@pytest.mark.parametrize("seed", first_fast([2, 4, 1, *range(5, 100), 0, 3], 1, 3))
+@pytest.mark.parametrize("seed", first_fast([2, 25, 4, 11, *sorted({*range(100)} - {2, 4, 11, 25})], 2, 4))
 def test_brute_force_finds_no_better_combination(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The value is the least of all combinations, and no bound is above it, whenever the search stops."""
     scene = random_scene(seed)
@@ -62,6 +62,8 @@ def test_brute_force_finds_no_better_combination(seed: int, tmp_path: Path, monk
             known[key] = methods._solve_reduced(part)
         return known[key]
 
+    # few boxes give weaker bounds, and no other answer
+    monkeypatch.setattr(solver, "BOXES", 4)
     # subsets are bounded before they are small too
     for size in (solver.LARGE, 2):
         monkeypatch.setattr(solver, "SMALL", min(solver.SMALL, size))
