@@ -58,15 +58,12 @@ class PlaneResult:
         The plane.
     counts
         Least residuals with 0, 1, 2 ... holes.
-    best
-        Number of holes of the selected design.
     design
         Holes of the selected design.
     """
 
     plane: Plane
     counts: tuple[Count, ...]
-    best: int
     design: Design
 
     @property
@@ -83,13 +80,13 @@ class PlaneResult:
     def is_fewest(self) -> bool:
         """True if fewer holes are proven to leave too much; if the residual is not met, any number of holes."""
         permitted = self.plane.permitted
-        others = self.counts[: self.best] if self.is_met else self.counts
+        others = self.counts[: len(self.design)] if self.is_met else self.counts
         return permitted is not None and all(count.bound > permitted for count in others)
 
     @property
     def is_least(self) -> bool:
         """True if no design of the numbers of holes in `counts` is better than the selected one by the gap."""
-        value = self.counts[self.best].value
+        value = self.counts[len(self.design)].value
         return abs(self.residual) <= value and all(count.proven or count.bound >= value for count in self.counts)
 
 
@@ -127,7 +124,7 @@ def correct(plane: Plane, max_holes: int, is_fewest: bool, gap: float) -> PlaneR
     thrifty = propose(plane, best, (), WASTE) if met else None
     if thrifty and permitted is not None and abs(plane.residual(thrifty)) <= permitted:
         design = min(design, thrifty, key=lambda one: plane.score(one, WASTE))
-    return PlaneResult(plane, tuple(counts), best, design)
+    return PlaneResult(plane, tuple(counts), design)
 
 
 def least_residual(plane: Plane, holes: int, gap: float, start: Design | None = ()) -> Count:
