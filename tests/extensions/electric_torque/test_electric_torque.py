@@ -269,7 +269,7 @@ def test_torques_and_unbalances_are_proven_together_at_each_operating_point() ->
 
 @pytest.mark.parametrize("given", [
     {"orders": [1, 1.5]},
-    {"orders": [], "harmonics": [{"order": 1.5, "torque": "60 N m", "angle": 95}, {"order": 1, "torque": "30 N m"}]},
+    {"orders": [], "harmonics": [{"order": 1.5, "torque": "50 N m", "angle": 95}, {"order": 1, "torque": "3 N m"}]},
 ])  # fmt: skip
 def test_open_stars_beside_a_torque_are_those_of_an_enumeration(given: dict[str, Any]) -> None:
     engine = {"throws": "open", "firing_order": "open", "cylinders": 3}
