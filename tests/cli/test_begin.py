@@ -9,12 +9,15 @@ import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from laufruhe import units
 from laufruhe.cli import app
-from laufruhe.files.reader import load
+from laufruhe.files.reader import load, load_tables
 from laufruhe.files.ready import SCHEMAS, ready
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.report import files
 from laufruhe.studies.reader import load_study
 from problem_files import PROBLEMS
@@ -71,6 +74,8 @@ def answered(*answers: str) -> str:
         (["twin", "", "", "180"], {"firing_intervals": [180, 540]}),
         (["twin", "", "", "even"], {"firing_intervals": None, "firing_order": [1, 2]}),
         (["60° V2"], {"layout": "vee", "bank_angle": 60, "cylinders": 2}),
+        (["V2 75 Grad"], {"layout": "vee", "bank_angle": 75, "cylinders": 2}),
+        (["Reihensechszylinder", "", "", "gleichmäßig", "1-5-3-6-2-4"], {"layout": "inline", "cylinders": 6}),
         (["flat four", "", "", "", "", "1-3-2-4"], {"layout": "boxer", "firing_order": [1, 3, 2, 4]}),
         (["V6", "", "", "60", "60", "by bank", "links", "", "163524"],
          {"split_pin_angle": 60, "first_bank": "left", "firing_order": [1, 6, 3, 5, 2, 4]}),
@@ -118,6 +123,26 @@ def test_a_mistake_is_told_and_asked_again(here: Path, answers: list[str], said:
     assert said in found.output
     assert "draft" not in found.output
     assert tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))["engine"][key] == value
+
+
+@pytest.mark.parametrize("answers", [["V2 90°"], ["V6", "", "", "60", "60"], ["boxer", "", "2"], ["single"]])
+def test_a_throw_carries_the_big_ends_of_all_its_rods(here: Path, answers: list[str]) -> None:
+    """The first order is that of rods as rigid bodies."""
+    shown = run.invoke(app, ["init"], input=answered(*answers)).output
+    piston, rod = (float(mass) for mass in re.findall(r"Mass of .* \[(.*) kg\]", shown))
+    tables = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))
+    engine = tables["engine"]
+    length = 0.5 * units.parse(engine["stroke"], "m") / engine["rod_ratio"]
+    # a third of the rod is its small end, by default
+    inertia = rod * length**2 * 2.0 / 9.0
+    body = {"mass": f"{rod} kg", "centre_of_gravity": f"{length / 3.0} m", "inertia": f"{inertia} kg m^2"}
+    bodies = {**engine, "reciprocating_mass": f"{piston} kg", "rotating_mass": "0 kg", "rod": body}
+    first, second = (
+        shaking_loads(problem.engine, problem.points[0]).at(1)
+        for problem in (load_tables({**tables, "engine": table}, here / "problem.toml") for table in (engine, bodies))
+    )
+    assert np.abs(first).max() > 1.0
+    np.testing.assert_allclose(first, second, atol=1e-5 * np.abs(first).max())
 
 
 def test_a_wrong_source_is_asked_again(here: Path) -> None:

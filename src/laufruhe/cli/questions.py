@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from math import pi
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -205,7 +205,8 @@ def _layout(key: str, text: str, _: Answers) -> Answers:
     The angle of a vee is that of its banks, and that of other layouts is the first firing interval.
     """
     layouts, counts, angles = list[str](), list[int](), list[int]()
-    for word, degrees in re.findall(r"(\d+|[^\W\d_]+)\s*(°|deg\b)?", re.sub("-?(zylinder|cyl\\w*)", " ", text.lower())):
+    plain = re.sub("-?(zylinder|cyl\\w*)", " ", re.sub("reihen-?", "inline ", text.lower()))
+    for word, degrees in re.findall(r"(\d+|[^\W\d_]+)\s*(°|deg\b|grad\b)?", plain):
         layout, count = trade_value("layout", word), trade_value("cylinders", word)
         if word.isdigit():
             (angles if degrees or int(word) > _MOST_CYLINDERS else counts).append(int(word))
@@ -226,7 +227,7 @@ def _layout(key: str, text: str, _: Answers) -> Answers:
 def _intervals(key: str, text: str, answers: Answers) -> Answers:
     """Return the firing intervals; the last one may be left out, as in 270 for 270-450, and even ones are none."""
     numbers = [_value(part) for part in re.split(r"[-,;\s]+", text.lower().replace("deg", "")) if part]
-    if numbers == ["even"]:
+    if numbers and numbers[0] in ("even", "gleichmäßig", "gleichmässig", "gleich"):
         return {key: []}
     degrees = [number for number in numbers if not isinstance(number, str)]
     cycle = 720.0 if answers["engine.cycle"] == str(Cycle.FOUR_STROKE) else 360.0
@@ -272,7 +273,10 @@ def _small_end(key: str, text: str, answers: Answers) -> Answers:
     if not 0.0 <= small <= rod:
         rule = f"is not between zero and the {rod:g} kg of the rod"
         raise refused(key, text, rule, "write for example 1/3, 30 % or 0.15 kg")
-    masses = {"reciprocating_mass": answers["piston mass"] + small, "rotating_mass": rod - small}
+    # a throw carries the big ends of all its rods; on split pins they stand to either side of its middle
+    half_split = math.radians(float(answers.get("engine.split_pin_angle", 0.0))) / 2.0
+    big_ends = _kind(answers).cylinders_per_throw * math.cos(half_split) * (rod - small)
+    masses = {"reciprocating_mass": answers["piston mass"] + small, "rotating_mass": big_ends}
     return {"small end": small, **{f"engine.{name}": f"{mass:.6g} kg" for name, mass in masses.items()}}
 
 
@@ -319,7 +323,7 @@ def _length(answers: Answers, key: str) -> float:
 def _scaled_mass(factor: float) -> Callable[[Answers], str]:
     # kg for each litre of a cylinder, half as much more in a diesel
     def usual(answers: Answers) -> str:
-        litres = 250.0 * pi * _length(answers, "bore") ** 2 * _length(answers, "stroke")
+        litres = 250.0 * math.pi * _length(answers, "bore") ** 2 * _length(answers, "stroke")
         return _rounded(factor * litres * (1.5 if answers.get("fuel") == "diesel" else 1.0), "kg")
 
     return usual
