@@ -43,7 +43,7 @@ def _tables(result: Result) -> list[Table]:
         for row in ranked.rows[:RANKED]
     ]
     return [
-        Table(["list", "row", "line", *heads], rows, "Chosen parts", 2, note, file="chosen-parts"),
+        Table(["list", "part", "row", *heads], rows, "Chosen parts", 2, note, file="chosen-parts"),
         replace(ranked, rows=best, title="Best combinations", note=counts),
     ]
 
