@@ -36,6 +36,12 @@ def test_the_recipe_needs_what_the_package_needs() -> None:
     assert found == {*PROJECT["dependencies"], f"python{PROJECT['requires-python']}"}
 
 
+def test_the_lowest_versions_are_tested_by_files_that_exist() -> None:
+    files = re.findall(r"\btests/\S+\.py", (ROOT / "Makefile").read_text(encoding="utf-8"))
+    assert len(files) > 10
+    assert [file for file in files if not (ROOT / file).is_file()] == []
+
+
 def test_the_lowest_versions_are_those_that_are_tested() -> None:
     """Each as pyproject.toml has it, all others as in constraints.txt where they may be."""
     lowest = dict(_pins("constraints-lowest.txt"))

@@ -92,7 +92,10 @@ def _cells(row: Row, factor: float) -> list[str]:
 
 def _change(row: Row) -> str:
     first, last = row.values
-    return percent(last / first - 1.0) if isinstance(first, float) and isinstance(last, float) and first else DASH
+    # a share of an angle says nothing
+    if row.unit != "rad" and isinstance(first, float) and isinstance(last, float) and first:
+        return percent(last / first - 1.0)
+    return DASH
 
 
 def _note(group: str, designs: Sequence[Design]) -> str:

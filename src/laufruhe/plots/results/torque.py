@@ -84,7 +84,11 @@ def figure(result: Result) -> Figure:
     radii = {part.crank_radius for part in engine.slider_cranks}
     radius = f"; over {1e3 * min(radii):.4g} mm, the tangential force" if len(radii) == 1 else ""
     lines = f"Torque on the crankshaft at {points[k].name}{radius}."
-    legend = [entry(name, color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in visible]
+    # weights, a load and electric machines are no part of the torque of all pistons
+    labels = {"all": "gas and pistons"} if {"weights", "load", "machines"} & visible.keys() else {}
+    legend = [
+        entry(labels.get(name, name), color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in visible
+    ]
     legend.append(entry(f"mean, {number(facts[k].mean, scale=largest)} N m", **_MEAN))
     legend += [entry(f"speed {item.name}", color=item.colour, linewidth=1.8) for item in turning]
     return finish_page(drawn, result, "Torque over one working cycle", lines, legend)
