@@ -108,6 +108,11 @@ FOUR = ["", "", "", "", "", "1-3-4-2"]
         (["", "", "five", "3", "", "", "1-2", "1-2-3"], "must be a whole number", "cylinders", 3),
         (["twin", "", "", "270-270", "270"], "does not divide the 720 deg of a cycle into 2 intervals; write even, or",
          "firing_intervals", [270, 450]),
+        (["89,6", ""], "has an angle, as only a vee, a boxer or a twin has", "layout", "inline"),
+        ([*FOUR[:-1], "112 mm", "1-3-4-2"], "is no order of the cylinders 1 to 4", "firing_order", [1, 3, 4, 2]),
+        ([*FOUR[:-1], "-", "", "0, 180, 180, 0", "-"], "is empty; write an angle for each throw", "throws",
+         [0, 180, 180, 0]),
+        ([*FOUR, '"80 mm"'], "Stroke [80 mm]", "bore", "80 mm"),
         ([*FOUR, "80", "81 mm"], 'write for example "120 mm"', "bore", "81 mm"),
         ([*FOUR, "1,5 mm", "82 mm"], 'write "1.5 mm"', "bore", "82 mm"),
         ([*FOUR, "", "", "", "1.2", "1:4"], "is no usual ratio", "rod_ratio", 0.25),
@@ -148,6 +153,27 @@ def test_a_throw_carries_the_big_ends_of_all_its_rods(here: Path, answers: list[
 def test_a_wrong_source_is_asked_again(here: Path) -> None:
     found = run.invoke(app, ["init"], input="bmw-b49\n" + answered())
     assert (found.exit_code, "did you mean 'bmw-b48'?" in found.output) == (0, True)
+
+
+@pytest.mark.parametrize(("name", "cylinders"), [("V8", 8), ("inline six", 6), ("270 twin", 2)])
+def test_a_layout_is_a_source(here: Path, name: str, cylinders: int) -> None:
+    found = run.invoke(app, ["init"], input="\n".join(["V7", name, "Mine", *[""] * 5, *[""] * 30]))
+    assert (found.exit_code, "is no multiple of the 2 banks" in found.output) == (0, True)
+    tables = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))
+    assert tables["engine"]["cylinders"] == cylinders
+    assert "Layout, or a name" not in found.output
+    is_vee = tables["engine"]["layout"] == "vee"
+    assert any("bank_stagger" in note for note in tables["assumptions"]) == is_vee
+
+
+def test_an_answer_can_be_changed(here: Path) -> None:
+    # the first question has none before it; a layout sets the number of cylinders, which is asked once it is gone
+    answers = ["<", "V6", "<", "inline", "", "<", "two-stroke", "3", "", "", "1-2-3", "<", "1-3-2"]
+    found = run.invoke(app, ["init"], input=answered(*answers))
+    assert found.exit_code == 0, found.output
+    engine = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))["engine"]
+    keys = ("layout", "cycle", "cylinders", "firing_order")
+    assert [engine[key] for key in keys] == ["inline", "two-stroke", 3, [1, 3, 2]]
 
 
 def test_petrol_and_diesel_have_pressures_of_their_own(here: Path) -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.cli.questions import ask, ask_engine
+from laufruhe.cli.questions import Answers, ask, ask_engine, layout_of
 from laufruhe.cli.screen import typed
-from laufruhe.errors import printed, refused
+from laufruhe.errors import InputError, printed, refused
 from laufruhe.files import drafts, ready
 from laufruhe.files.catalogue import engine_named, engines
 from laufruhe.files.complaints import errors_in_file, nearest
@@ -22,7 +22,7 @@ _TAKEN = ("exists with other contents", "choose another name")
 
 def write_draft(file: Path, name: str | None) -> str:
     """Write a problem file and its schema into one folder, and return the message about it."""
-    source = _checked_source(name) if name is not None else _requested_source(file)
+    source, layout = (_checked_source(name), {}) if name is not None else _requested_source(file)
     command = "solve"
     if source is not None and source not in engines():
         entry = ready.ready_named(source)
@@ -30,21 +30,32 @@ def write_draft(file: Path, name: str | None) -> str:
         copies = ready.copies([source]).items()
         texts = {file.name if copy_name == entry.path.name else copy_name: text for copy_name, text in copies}
     else:
-        draft = drafts.draft_of_tables(ask_engine(), file) if source is None else drafts.draft_of_engine(source)
+        draft = drafts.draft_of_tables(ask_engine(layout), file) if source is None else drafts.draft_of_engine(source)
         texts = {file.name: draft, **dict([ready.schema_file()])}
     _write({file.parent / copy_name: text for copy_name, text in texts.items()})
     return f"{printed(str(file))}: ready to be changed; then: {typed('laufruhe', command, str(file))}\n"
 
 
-def _requested_source(file: Path) -> str | None:
-    # an engine that the user describes has no source
+def _requested_source(file: Path) -> tuple[str | None, Answers]:
+    # an engine that the user describes has no source, and perhaps a layout
     if file.exists():
         raise refused("file", str(file), *_TAKEN)
     typer.echo("Start from an engine (laufruhe engines) or a ready problem (laufruhe examples),")
-    source: str | None = ask(
-        "or press Enter to describe your own engine", "", lambda text: _checked_source(text) if text else None
-    )
+    words = "or press Enter to describe your own engine, or name its layout, such as V8"
+    source: tuple[str | None, Answers] = ask(words, "", _source_or_layout)
     return source
+
+
+def _source_or_layout(text: str) -> tuple[str | None, Answers]:
+    if not text:
+        return None, {}
+    try:
+        return _checked_source(text), {}
+    except InputError:
+        layout = layout_of(text)
+        if layout is None:
+            raise
+        return None, layout
 
 
 def _checked_source(source: str) -> str:

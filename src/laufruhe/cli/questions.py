@@ -28,6 +28,8 @@ from laufruhe.physics.gas_facts import gas_facts
 
 Answers: TypeAlias = dict[str, Any]
 """Values by their addresses in the file, such as engine.bore; addresses without a dot are of the interview alone."""
+_BACK = "<"
+"""Answer that returns to the question before."""
 _MOST_CYLINDERS = 24
 """Largest number in the name of an engine that counts its cylinders; larger ones are angles in degrees."""
 _LEAST_RATIO, _LARGEST_RATIO = 2.5, 8.0
@@ -72,22 +74,53 @@ class _Question:
         return self.usual if isinstance(self.usual, str) else self.usual(answers)
 
 
-def ask_engine() -> dict[str, Any]:
-    """Return title, assumptions, [engine], [gas] and operating point of an engine that the user describes."""
-    answers: Answers = {"title": ask("Title", "My engine", lambda text: text or "My engine")}
-    assumed: list[str] = []
-    for question in _QUESTIONS:
-        if question.key in answers or not question.applies(answers):
-            continue
-        choices = _CHOICES.get(question.key, ())
-        usual = _usual_in_catalogue(question, answers)
-        words = f"{question.words} ({', '.join(choices)})" if choices else question.words
-        values, is_usual = ask(words, usual, partial(_read, question, answers, usual))
-        answers |= values
-        if is_usual and question in _SIZES:
-            assumed.append(re.split(r" \[|,", question.words)[0].lower())
+class _Back(Exception):
+    """Answer that returns to the question before."""
+
+
+def ask_engine(layout: Answers) -> dict[str, Any]:
+    """Return title, assumptions, [engine], [gas] and operating point of an engine that the user describes.
+
+    `layout` has the answers to the first question, or is empty.
+    """
+    title: Answers = {"title": ask("Title", "My engine", lambda text: text or "My engine")}
+    typer.echo(f"Enter takes the answer in brackets; {_BACK} returns to the question before.")
+    answers, assumed = {**title, **layout}, list[str]()
+    history = [(0, title, assumed)] if layout else []
+    k = 0
+    while k < len(_QUESTIONS):
+        question = _QUESTIONS[k]
+        if question.key not in answers and question.applies(answers):
+            choices = _CHOICES.get(question.key, ())
+            usual = _usual_in_catalogue(question, answers)
+            words = f"{question.words} ({', '.join(choices)})" if choices else question.words
+            try:
+                values, is_usual = ask(words, usual, partial(_read, question, answers, usual))
+            except _Back:
+                k, answers, assumed = history.pop() if history else (k, answers, assumed)
+                continue
+            history.append((k, answers, assumed))
+            answers = {**answers, **values}
+            if is_usual and question in _SIZES:
+                assumed = [*assumed, re.split(r" \[|,", question.words)[0].lower()]
+        k += 1
     notes = [f"Usual values, until you put your own: {', '.join(assumed)}."] if assumed else []
+    if _kind(answers).takes("bank_stagger") and "engine.bank_stagger" not in answers:
+        notes.append("Opposed cylinders have no distance along the crank, until you put bank_stagger.")
     return {**_tables(answers), **({"assumptions": notes} if notes else {})}
+
+
+def layout_of(text: str) -> Answers | None:
+    """Return the answers in the name of a layout, such as V8, None for another text.
+
+    Raise `InputError` if the engine is impossible.
+    """
+    try:
+        values = _layout("engine.layout", text, {})
+    except InputError:
+        return None
+    _check({"title": "Layout", **values})
+    return values
 
 
 def ask(words: str, usual: str, read: Callable[[str], Any]) -> Any:
@@ -103,7 +136,8 @@ def ask(words: str, usual: str, read: Callable[[str], Any]) -> Any:
         if not text.isprintable():
             raise typer.BadParameter("holds a character that is not printed; type it once more")
         try:
-            return read(text.strip())
+            # quotes belong to files
+            return read(re.sub('^"(.*)"$', r"\1", text.strip()))
         except InputError as error:
             first = error.complaints[0]
             message = "; ".join(filter(None, (first.rule, first.remedy)))
@@ -121,6 +155,8 @@ def ask(words: str, usual: str, read: Callable[[str], Any]) -> Any:
 
 
 def _read(question: _Question, answers: Answers, usual: str, text: str) -> tuple[Answers, bool]:
+    if text == _BACK:
+        raise _Back
     values = question.read(question.key, text or usual, answers)
     _check({**answers, **values})
     return values, not text
@@ -219,6 +255,8 @@ def _layout(key: str, text: str, _: Answers) -> Answers:
     if (not layouts and not counts) or len(set(layouts)) > 1 or len(counts) > 1 or len(angles) > 1:
         raise refused(key, text, "is not one layout", _LAYOUT_REMEDY)
     layout = layouts[0] if layouts else "inline"
+    if angles and LAYOUTS[layout].banks == 1 and counts != [2]:
+        raise refused(key, text, "has an angle, as only a vee, a boxer or a twin has", _LAYOUT_REMEDY)
     angle = "engine.bank_angle" if LAYOUTS[layout].takes("bank_angle") else "first interval"
     named = {"engine.cylinders": counts, angle: angles}
     return {key: layout, **{name: numbers[0] for name, numbers in named.items() if numbers}}
@@ -244,10 +282,16 @@ def _order(key: str, text: str, answers: Answers) -> Answers:
         # throws take the place of firing intervals
         return {key: [], "engine.firing_intervals": []}
     listed = "-".join(text) if text.isdigit() and len(text) == _count(answers) else text
-    return {key: [_value(part) for part in re.split(r"[-,;\s]+", listed)]}
+    numbers = [_value(part) for part in re.split(r"[-,;\s]+", listed)]
+    if not all(isinstance(number, int) and 1 <= number <= _count(answers) for number in numbers):
+        rule = f"is no order of the cylinders 1 to {_count(answers)}"
+        raise refused(key, text, rule, f"write their numbers as they fire, or {_BACK} to change the answer before")
+    return {key: numbers}
 
 
 def _throws(key: str, text: str, _: Answers) -> Answers:
+    if not text:
+        raise refused(key, text, "is empty", f"write an angle for each throw, or {_BACK} to enter a firing order")
     return {key: [_value(part) for part in re.split(r"[,;\s]+", text) if part]}
 
 
