@@ -19,18 +19,22 @@ LONGEST = 100
 MAX_FACTORS = 12
 """Largest number of names in one unit."""
 _QUANTITY = re.compile(
-    r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .·⁻-]*|(?:1 ?)?/ ?min)?\s*$"
+    r"^\s*(?P<sign>[+-]?)(?:(?P<whole>\d+)\s+(?=\d+/\d))?(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+    r"(?:/(?P<divisor>\d+))?\s*(?P<unit>[A-Za-z°µ%][\w°µ%/*^ .·⁻-]*|(?:1 ?)?/ ?min|[\"″])?\s*$"
 )
+"""Number with a unit; 3 5/16 is a whole number and a fraction."""
+_RATIO = re.compile(r"(?<=\d) ?: ?(?=\d)")
+"""Sign of division in a ratio such as 10:1."""
 ATMOSPHERE = 101_325.0
 """Standard pressure of the air [Pa]."""
 _MARKED = re.compile(
-    r"^\s*(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>m?bar|psi|[kM]?Pa|kp/cm\^?2)\s*"
+    r"^\s*(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>m?bar|psi|[kM]?Pa|kp/cm\^?2|at(?=ü))\s*"
     r"\(?(?:(?P<gauge>g|gauge|ü|überdruck)|a|abs|absolute)\.?\)?\s*$",
     re.IGNORECASE,
 )
 """Pressure with a mark behind its unit, as in bar(g), psia or bar gauge."""
-DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
-"""Number with a decimal comma."""
+DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])(?P<end>\s*$)?")
+"""Number with a decimal comma, which has an end if nothing follows."""
 THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
 """Number with a comma that may separate thousands."""
 # cm2 is read as cm^2; the digit of H2O is no power
@@ -48,11 +52,14 @@ _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
     "newton_metre = newton * meter = Nm",
     "@alias pound = lbm",
+    "metric_pound = 500 * gram",
     "pferdestaerke = 75 * kilogram_force * meter / second = PS",
 )
 
 _SPELLINGS: dict[str, dict[str, str]] = {
-    "m": {"Zoll": "inch"},
+    "m": dict.fromkeys(("Zoll", '"', "″"), "inch"),
+    "kg": {"Pfund": "metric_pound"},
+    "W": dict.fromkeys(("HP", "bhp"), "hp"),
     "kg m": {"kgm": "kg m", "kgcm": "kg cm", "kgmm": "kg mm", "gcm": "g cm", "gmm": "g mm", "ozin": "oz in"},
     "kg m^2": {"kgm^2": "kg m^2", "kgm2": "kg m^2", "kgcm^2": "kg cm^2", "kgcm2": "kg cm^2", "kgmm^2": "kg mm^2"},
     "N": {"lb": "lbf", "lbs": "lbf"},
@@ -225,21 +232,22 @@ def _in_units(unit: str) -> str:
 
 def parse(text: str, unit: str) -> float:
     """Return the SI value of a text such as '120 mm'; `UnitError` unless it has the dimension of the SI unit `unit`."""
+    text = text if unit else _RATIO.sub("/", text)
     match = _QUANTITY.match(text) if len(text) <= LONGEST else None
     if unit == "Pa" and (marked := _MARKED.match(text[:LONGEST])):
         _refuse_mark(**marked.groupdict())
-    if match is None and DECIMAL_COMMA.match(text[:LONGEST]):
-        point, without_comma = (text.replace(",", mark, 1).strip() for mark in (".", ""))
-        point, without_comma = _written(point, unit), _written(without_comma, unit)
-        either = f"write {without_comma} or {point}" if THOUSANDS.match(text) else f"write {point}"
-        raise UnitError(f"has a comma, and decimals follow a point; {either}")
+    if match is None and (comma := DECIMAL_COMMA.match(text[:LONGEST])):
+        has_unit = comma["end"] is None or not unit
+        end = "" if has_unit else f" {example(unit).partition(' ')[2]}"
+        point, without_comma = (_written(text.replace(",", mark, 1).strip() + end, unit) for mark in (".", ""))
+        either = f"{without_comma} or {point}" if THOUSANDS.match(text) else point
+        raise UnitError(f"has a comma, and decimals follow a point; write {'' if has_unit else 'for example '}{either}")
     if match is None:
         raise UnitError(f"is not a number{' with a unit' * bool(unit)}; {advice(unit)}")
-    number, divisor, name = match.groups()
-    below = float(divisor or 1)
+    name, below = match["unit"], float(match["divisor"] or 1)
     if below == 0.0:
         raise UnitError(f"divides by zero; {advice(unit)}")
-    value = float(number) / below
+    value = float(f"{match['sign']}1") * (float(match["whole"] or 0) + float(match["number"]) / below)
     if name is None and unit:
         raise UnitError(f"has no unit, {dimension_name(unit)} needs one; {advice(unit)}")
     value *= _factor(name.strip(), unit) if name else 1.0
@@ -254,13 +262,15 @@ def _refuse_mark(number: str, unit: str, gauge: str | None) -> None:
     if not gauge:
         raise UnitError(f"has a mark, and pressures are absolute without one; write {plain}")
     bars = 1e-5 * (float(number) * _factor(unit, "Pa") + ATMOSPHERE)
-    raise UnitError(f'is a pressure above that of the air; write "{bars:.4g} bar", or {plain} for a mean pressure')
+    raise UnitError(
+        f'is a gauge pressure, above that of the air; write "{bars:.4g} bar", or {plain} for a mean pressure'
+    )
 
 
 def unit_of(text: str) -> str:
     """Return the unit in a text such as '120 mm'; empty if there is none."""
     match = _QUANTITY.match(text)
-    return (match.group(3) or "").strip() if match else ""
+    return (match["unit"] or "").strip() if match else ""
 
 
 def dimension_of(text: str) -> str | None:
@@ -300,7 +310,7 @@ _WRITTEN = {
     "ohm": "[mk]?ohm",
     "N m/A": f"(?:[kM]?Nm|{_FORCE}{_BY}{_LENGTH}){_OVER}[mk]?A",
 }
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?"
+_NUMBER = r"[+-]?(?:[0-9]+ +[0-9]+/[0-9]+|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?)"
 
 
 def pattern(unit: str) -> str:

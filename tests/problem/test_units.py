@@ -85,6 +85,15 @@ class TestParse:
             ("100 kPa", "Pa", 1e5),
             ("10 °KW", "rad", math.radians(10)),
             ("90 Grad", "rad", math.pi / 2),
+            *(
+                (text, "m", 0.0254 * 53 / 16)
+                for text in ("3 5/16 Zoll", '3.3125"', '3 5/16"', "3.3125″", "+3  5/16 in")
+            ),
+            ("-1 1/2 in", "m", -0.0381),
+            ("3 Pfund", "kg", 1.5),
+            ("10:1", "", 10.0),
+            ("1 : 4", "", 0.25),
+            ("2 HP", "W", 2 * 550 * 0.3048 * 0.45359237 * GRAVITY),
         ],
     )
     def test_units_of_the_field(self, text: str, unit: str, value: float) -> None:
@@ -144,9 +153,16 @@ class TestParse:
     @pytest.mark.parametrize(
         ("text", "said"),
         [
-            ("6 barg", 'is a pressure above that of the air; write "7.013 bar", or "6 bar" for a mean pressure'),
-            ("6 bar(g)", 'is a pressure above that of the air; write "7.013 bar", or "6 bar" for a mean pressure'),
-            ("60 psi gauge", 'is a pressure above that of the air; write "5.15 bar", or "60 psi" for a mean pressure'),
+            ("6 barg", 'is a gauge pressure, above that of the air; write "7.013 bar", or "6 bar" for a mean pressure'),
+            (
+                "6 bar(g)",
+                'is a gauge pressure, above that of the air; write "7.013 bar", or "6 bar" for a mean pressure',
+            ),
+            ("5 atü", 'is a gauge pressure, above that of the air; write "5.917 bar", or "5 at" for a mean pressure'),
+            (
+                "60 psi gauge",
+                'is a gauge pressure, above that of the air; write "5.15 bar", or "60 psi" for a mean pressure',
+            ),
             ("2 bar (abs)", 'has a mark, and pressures are absolute without one; write "2 bar"'),
         ],
     )
@@ -169,6 +185,8 @@ class TestParse:
     def test_a_decimal_comma_is_explained(self) -> None:
         with pytest.raises(UnitError, match=r'has a comma, and decimals follow a point; write "12\.5 mm"'):
             parse("12,5 mm", "m")
+        with pytest.raises(UnitError, match=r'decimals follow a point; write for example "12\.5 mm"'):
+            parse("12,5", "m")
         for text, said in (("6,000 rpm", 'write "6000 rpm" or "6.000 rpm"'), ("0,125 rpm", 'write "0.125 rpm"')):
             with pytest.raises(UnitError, match=said):
                 parse(text, "rad/s")
