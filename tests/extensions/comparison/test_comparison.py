@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from typer.testing import CliRunner, Result
 import laufruhe
 from laufruhe.cli import app
 from laufruhe.extensions.comparison.designs import Design, designs_of
-from laufruhe.extensions.comparison.rows import INPUTS, OBJECTIVES, rows_of
+from laufruhe.extensions.comparison.rows import INPUTS, OBJECTIVES, assumptions_of, rows_of, tables_of
 from laufruhe.problem.evaluation import place_measures
 from problem_files import PROBLEMS
 
@@ -66,6 +67,20 @@ def test_numbers_are_those_of_the_results(folder: Path) -> None:
 def test_inputs_that_differ_are_compared_as_quantities(designs: list[Design]) -> None:
     names = {row.name for row in rows_of(designs) if row.group == INPUTS}
     assert names == {"operating_points.1.mean_piston_speed", "counterweights.web.balance_factor"}
+
+
+def test_assumptions_name_their_designs(designs: list[Design]) -> None:
+    first, second = designs
+    pair = [replace(design, record={**design.record, "assumptions": texts})
+            for design, texts in ((first, ["common", "one"]), (second, ["common"]))]  # fmt: skip
+    assert assumptions_of(pair) == ["common", f"{first.name}: one"]
+
+
+def test_the_note_about_dashes_stands_where_one_is(designs: list[Design]) -> None:
+    row = next(row for row in rows_of(designs) if row.group == INPUTS and None not in row.values)
+    for values, has_note in ((row.values, False), ((None, 1.0), True)):
+        (table,) = tables_of([replace(row, values=values)], designs)
+        assert ("dash" in table.note) == has_note
 
 
 def test_every_objective_is_evaluated_for_every_design(folder: Path, designs: list[Design]) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from laufruhe.cli.screen import Ask
 from laufruhe.extensions.comparison.designs import Design, designs_of
 from laufruhe.extensions.comparison.rows import (
+    assumptions_of,
     common_places,
     number_table,
     of_place,
@@ -41,7 +42,9 @@ def compared(
     designs = designs_of(paths, say)
     rows = rows_of(designs)
     names = " and ".join(filter(None, (", ".join(d.name for d in designs[:-1]), designs[-1].name)))
-    titles = Bullets("Problems:", [f"{design.name}: {design.record['title']}" for design in designs])
+    heads = [Bullets("Problems:", [f"{design.name}: {design.record['title']}" for design in designs])]
+    if assumptions := assumptions_of(designs):
+        heads.append(Bullets("Assumptions:", assumptions))
     tables = tables_of(rows, designs)
     blocks: list[Block] = [*tables, Heading("Reproduce"), Code(command), Paragraph(made_with())]
     document = Document(f"Comparison of {names}", tuple(blocks))
@@ -49,7 +52,7 @@ def compared(
         names_of_files = (files.REPORT, files.PAGE, TABLE, *(f"{NAME}.{kind}" for kind in files.KINDS))
         with files.staged(files.FileSet(out, "--out", "compare", names_of_files)) as stage:
             svg = ask("laufruhe.plots.picture:save_picture", picture_of(designs, document.title), stage / NAME, kinds)
-            whole = Document(document.title, (titles, blocks[0], Illustration(NAME, CAPTION), *blocks[1:]))
+            whole = Document(document.title, (*heads, blocks[0], Illustration(NAME, CAPTION), *blocks[1:]))
             write_csv(number_table(rows, designs), stage / TABLE)
             files.write(stage / files.PAGE, as_html(whole, {NAME: svg()}))
             files.write(stage / files.REPORT, whole.as_markdown(f".{kinds[0]}"))
@@ -58,7 +61,7 @@ def compared(
         for design in designs
         if not design.has_design
     ]
-    screen = Document(document.title, (titles, *tables))
+    screen = Document(document.title, (*heads, *tables))
     return partial(show_document, screen, sys.stdout, out, files.PAGE), failures
 
 

@@ -53,6 +53,15 @@ def rows_of(designs: Sequence[Design]) -> list[Row]:
     return [row for rows in groups for row in rows(designs)]
 
 
+def assumptions_of(designs: Sequence[Design]) -> list[str]:
+    """Return the assumptions of all designs, with the names of the designs if some do not have them."""
+    names: dict[str, list[str]] = {}
+    for design in designs:
+        for text in design.record.get("assumptions") or ():
+            names.setdefault(text, []).append(design.name)
+    return [text if len(of) == len(designs) else f"{', '.join(of)}: {text}" for text, of in names.items()]
+
+
 def tables_of(rows: Sequence[Row], designs: Sequence[Design]) -> list[Table]:
     """Return a table of each group in units of reports."""
     tables = []
@@ -68,7 +77,7 @@ def tables_of(rows: Sequence[Row], designs: Sequence[Design]) -> list[Table]:
         if not any(row.unit for row in rows_of_group):
             head, cells = (head[0], *head[2:]), [(cell[0], *cell[2:]) for cell in cells]
         left = 2 if any(row.unit for row in rows_of_group) else 1
-        tables.append(Table(head, cells, title=group, note=_note(group, designs), left=left))
+        tables.append(Table(head, cells, title=group, note=_note(group, designs, rows_of_group), left=left))
     return tables
 
 
@@ -98,13 +107,13 @@ def _change(row: Row) -> str:
     return DASH
 
 
-def _note(group: str, designs: Sequence[Design]) -> str:
+def _note(group: str, designs: Sequence[Design], rows: Sequence[Row]) -> str:
     if group == OBJECTIVES:
         unknown = [f"{design.name}: {design.note}" for design in designs if design.note]
         text = "Each objective, with its operating points, is evaluated for every design whose cylinders, and mounts "
         text += "or other places of the objective, have the same names. Limits of other problems are not checked."
         return f"{text} Not evaluated with other objectives: {'; '.join(unknown)}." if unknown else text
-    return "A dash: not in this file." if group == INPUTS else ""
+    return "A dash: not in this file." if group == INPUTS and any(None in row.values for row in rows) else ""
 
 
 def _proofs(designs: Sequence[Design]) -> Iterator[Row]:
