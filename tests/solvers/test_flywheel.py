@@ -19,6 +19,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Status
 from laufruhe.solvers.boxes.flywheel import _Coordinates
+from laufruhe.solvers.methods import refuse
 from one_cylinder import irregularity
 from problem_files import PROBLEMS, changed, loaded
 from ready import solved
@@ -289,6 +290,26 @@ def test_a_flywheel_beside_counterweights_is_the_sum_of_both(tmp_path: Path) -> 
         )
     with pytest.raises(ModelError, match="no objective or limit depends on it"):
         laufruhe.solve(loaded(tmp_path, SINGLE + INERTIA + web + force))
+
+
+def test_objectives_in_order_decide_a_flywheel_and_a_counterweight_apart(tmp_path: Path) -> None:
+    """Neither order changes the optimum of either; a number that no objective needs is refused by `check` too."""
+    size = 'radius = "80 mm"\nopposite_throw = 1\nmass = { between = ["0 kg", "2 kg"] }'
+    web = f'[[counterweights]]\nname = "web"\n{size}\n'
+    force = '[[objective]]\nminimise = "maximum shaking force"\n'
+    limit = changed(LEAST, '[objective]\nminimise = "flywheel inertia"\n', "")
+    inertia = '[[objective]]\nminimise = "flywheel inertia"\n'
+    alone = [proven(loaded(tmp_path, SINGLE + text)) for text in (INERTIA + inertia + limit, web + force)]
+    orders = [(inertia, force), (force, inertia)]
+    for order, expected in zip(orders, (alone, alone[::-1]), strict=True):
+        result = proven(loaded(tmp_path, SINGLE + INERTIA + web + "".join(order) + limit))
+        for rank, single in zip(result.ranks, expected, strict=True):
+            assert (rank.minimum, rank.final) == pytest.approx((single.objective.value,) * 2, rel=1e-5)
+            assert single.certificate.lower_bound * (1.0 - 1e-4) <= rank.lower_bound <= single.objective.value
+            assert rank.proof is Proof.GLOBAL
+        assert result.limits[0].value <= 0.01 * (1.0 + 1e-6)
+    with pytest.raises(ModelError, match="flywheel is open, but no objective term depends on this number"):
+        refuse(loaded(tmp_path, SINGLE + INERTIA + web + force + limit))
 
 
 def test_a_flywheel_beside_an_open_crank_is_that_of_each_crank(tmp_path: Path) -> None:

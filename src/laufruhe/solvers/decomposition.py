@@ -1,12 +1,13 @@
 """Solve flywheel, crankshaft and all other decisions as separate problems.
 
 At constant speed each measure depends on one of these problems alone. So the sum of the optima is the
-optimum, and the sum of the lower bounds is a lower bound.
+optimum, and the sum of the lower bounds is a lower bound. An objective of an order of priority may leave
+a problem out; another objective of that order decides it, and adds nothing to the sum.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +16,7 @@ from laufruhe.numerics.witness import check_bound
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure
+from laufruhe.problem.measure import Measure, PriorityLevel, Term
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
@@ -46,33 +47,52 @@ def is_separable(problem: Problem) -> bool:
     return is_divided and all(len(_groups_of(measure, problem)) <= 1 for measure in problem.measures)
 
 
-def solve_decomposed(problem: Problem, solve: Solve) -> Result:
-    """Solve each group of decisions by its own method, and return one joint result.
+def _terms_of(group: Kinds, terms: Iterable[Term], problem: Problem) -> tuple[Term, ...]:
+    # measures that depend on no group belong to the last one
+    last = _groups(problem)[-1:]
+    return tuple(term for term in terms if group in (_groups_of(term.measure, problem) or last))
+
+
+def refuse_unused(problem: Problem, ranks: Iterable[PriorityLevel]) -> None:
+    """Raise an error for a group of decisions on which no objective depends.
 
     Raises
     ------
     ModelError
-        If the objective depends on no decision of a group.
+        If neither the objective nor one of `ranks` depends on a group.
+    """
+    terms = [*problem.objective, *(term for rank in ranks for term in rank.terms)]
+    for group in _groups(problem):
+        names = [decision.name.split(".")[0] for decision in problem.decisions if decision.kind in group]
+        if names and not _terms_of(group, terms, problem):
+            raise ModelError(
+                f"{names[0]} is open, but no objective term depends on this number; add such a term, or fix the number"
+            )
+
+
+def solve_decomposed(problem: Problem, solve: Solve, ranks: Iterable[PriorityLevel] = ()) -> Result:
+    """Solve each group of decisions by its own method, and return one joint result.
+
+    A group that the objective leaves out is decided by the first of `ranks` that depends on it.
     """
     groups = _groups(problem)
-    # measures that depend on no group belong to the last one
-    group_of = {measure: (_groups_of(measure, problem) or groups[-1:])[0] for measure in problem.measures}
+    objectives = [problem.objective, *(rank.terms for rank in ranks)]
     parts = {
         group: problem.changed(
             decisions=tuple(d for d in problem.decisions if d.kind in group),
-            objective=tuple(term for term in problem.objective if group_of[term.measure] == group),
-            limits=tuple(limit for limit in problem.limits if group_of[limit.measure] == group),
+            objective=next(filter(None, (_terms_of(group, terms, problem) for terms in objectives)), ()),
+            limits=tuple(x for x in problem.limits if group in (_groups_of(x.measure, problem) or groups[-1:])),
         )
         for group in groups
     }
-    for part in parts.values():
-        if part.decisions and not part.objective:
-            name = part.decisions[0].name.split(".")[0]
-            raise ModelError(
-                f"{name} is open, but no objective term depends on this number; add such a term, or fix the number"
-            )
+    unused = {group for group in groups if not _terms_of(group, problem.objective, problem)}
     by_group = {group: solve(part) for group, part in parts.items() if part.decisions or part.objective or part.limits}
+    for group in unused.intersection(by_group):
+        # the objective does not change with these limits
+        free = tuple(replace(x, shadow_price=0.0, tightening_price=None) for x in by_group[group].limits)
+        by_group[group] = replace(by_group[group], limits=free)
     results = list(by_group.values())
+    summands = [result for group, result in by_group.items() if group not in unused]
     for result in results:
         if result.status is Status.INFEASIBLE:
             return infeasible_result(problem, evaluate_start(problem), result.conflict, result.timing)
@@ -87,14 +107,14 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
         limit: entry for result in results for limit, entry in zip(result.problem.limits, result.limits, strict=True)
     }
     decisions = {entry.name: entry for result in results for entry in result.decisions}
-    value, initial = (sum(getattr(r.objective, key) for r in results if r.objective) for key in ("value", "initial"))
-    proven = all(r.certificate is None or r.certificate.kind is Proof.GLOBAL for r in results)
+    value, initial = (sum(getattr(r.objective, key) for r in summands if r.objective) for key in ("value", "initial"))
+    proven = all(r.certificate is None or r.certificate.kind is Proof.GLOBAL for r in summands)
     status = Status.OPTIMAL if proven else Status.FEASIBLE
     return Result(
         problem=problem,
         status=Status.FAILED if any(r.status is Status.FAILED for r in results) else status,
         objective=ObjectiveValue.of(problem, value, initial),
-        certificate=_joint_certificate(results, value),
+        certificate=_joint_certificate(summands, value),
         decisions=tuple(decisions.values()),
         limits=tuple(limits[limit] for limit in problem.limits),
         initial=evaluate_start(problem),

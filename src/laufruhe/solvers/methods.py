@@ -23,7 +23,7 @@ from laufruhe.problem.channels import (
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends, open_kinds
 from laufruhe.problem.evaluation import objective_value, with_fine_sampling
-from laufruhe.problem.measure import Limit
+from laufruhe.problem.measure import Limit, PriorityLevel
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -43,7 +43,7 @@ from laufruhe.solvers.conclusion import (
 )
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
-from laufruhe.solvers.decomposition import is_separable, solve_decomposed
+from laufruhe.solvers.decomposition import is_separable, refuse_unused, solve_decomposed
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, imported, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
@@ -277,6 +277,11 @@ def refuse(problem: Problem) -> None:
     ModelError
         If the objective depends on no open number, or a combination of open numbers has no method.
     """
+    _refuse(problem, ())
+
+
+def _refuse(problem: Problem, ranks: Sequence[PriorityLevel]) -> None:
+    # the problem has one objective of `ranks`, or is complete
     for reduction in reductions():
         if reduction.refuse is not None and reduction.applies(problem):
             return reduction.refuse(problem)
@@ -294,6 +299,8 @@ def refuse(problem: Problem) -> None:
         raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")
     if problem.phasing is not None and _method(problem).solver is _SOLVE_STARS:
         refuse_long(problem)
+    if _method(problem).solver is solve_separable:
+        refuse_unused(problem, ranks)
 
 
 def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
@@ -336,13 +343,15 @@ def by_solver(problem: Problem, name: str) -> Problem:
 
 def _refuse_ranks(problem: Problem) -> None:
     for rank in problem.ranks:
-        refuse(problem.changed(ranks=(), objective=rank.terms))
+        _refuse(problem.changed(ranks=(), objective=rank.terms), problem.ranks)
 
 
 def _solve_ranks(problem: Problem, decide: Decide, _: Decide) -> Result:
     from laufruhe.solvers.lexicographic import solve_lexicographic
 
-    return solve_lexicographic(problem, decide)
+    is_divided = _method(problem).solver is solve_separable
+    solve_rank = partial(solve_decomposed, solve=decide, ranks=problem.ranks) if is_divided else decide
+    return solve_lexicographic(problem, solve_rank)
 
 
 def _constant_limits(problem: Problem) -> list[Limit]:
