@@ -238,7 +238,7 @@ def test_work_of_a_compressor_in_closed_form(end: str, pressures: tuple[float, f
     diagram = Compressor(suction, delivery, c, exponent)
     ratio = delivery / suction
     efficiency = 1.0 + c - c * ratio ** (1.0 / exponent)
-    assert diagram.volumetric_efficiency == pytest.approx(efficiency, rel=1e-12)
+    assert 1.0 - diagram.release == pytest.approx(efficiency, rel=1e-12)
     chamber = Chamber("stage", ("cylinder 1",), end, 0.12, 0.03, diagram)
     gain = exponent / (exponent - 1.0) * (ratio ** ((exponent - 1.0) / exponent) - 1.0)
     work = gain * suction * efficiency * chamber.area * PART.stroke

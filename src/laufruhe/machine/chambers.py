@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -83,6 +83,11 @@ class Pump(Steam):
         super().__init__(suction, delivery, cut_off=1.0)
 
 
+def suction_point(pressure_ratio: float, clearance: float, exponent: float) -> float:
+    """Return the part of the stroke where gas in the clearance has expanded to a ratio of its pressure (G17a)."""
+    return clearance / pressure_ratio ** (1.0 / exponent) - clearance
+
+
 class Compressor(Steam):
     """A piston compressor of gas with ideal valves (G17a).
 
@@ -99,7 +104,7 @@ class Compressor(Steam):
         if not 0.0 < clearance < math.inf:
             raise ModelError(f"clearance {clearance:g} must be positive; 0.03 to 0.15 is usual")
         shrinking = (suction / delivery) ** (1.0 / exponent) if exponent > 0.0 else 1.0
-        suction_begin = clearance / shrinking - clearance
+        suction_begin = suction_point(suction / delivery, clearance, exponent) if exponent > 0.0 else 0.0
         if suction_begin >= 1.0:
             raise ModelError(
                 f"clearance {clearance:g} takes no gas in, because what it holds at {delivery * 1e-5:g} bar fills the "
@@ -107,11 +112,6 @@ class Compressor(Steam):
             )
         delivery_begin = (1.0 + clearance) * shrinking - clearance
         super().__init__(delivery, suction, 0.0, suction_begin, 1.0, delivery_begin, clearance, exponent)
-
-    @property
-    def volumetric_efficiency(self) -> float:
-        """Gas taken in, at suction pressure, over the volume of the stroke."""
-        return 1.0 - self.release
 
 
 @dataclass(frozen=True)
@@ -148,6 +148,10 @@ class Chamber:
     def area(self) -> float:
         """Area under pressure [m2], F' or F'' of eq. 296."""
         return math.pi / 4.0 * (self.bore - self.rod) * (self.bore + self.rod)
+
+    def swept_volume(self, slider_cranks: Iterable[SliderCrank]) -> float:
+        """Return the volume of the stroke [m3], summed over the slider-cranks with this chamber."""
+        return self.area * sum(part.stroke for part in slider_cranks if part.name in self.cylinders)
 
     @property
     def side(self) -> int:

@@ -107,7 +107,7 @@ def _chamber_facts(
     angles = math.tau * np.arange(_STEPS) / _STEPS
     pressures = chamber_pressure(chamber, parts[0], angles)
     peak = int(np.argmax(pressures > (1.0 - _ROUNDING) * pressures.max()))
-    swept = chamber.area * sum(part.stroke for part in parts)
+    swept = chamber.swept_volume(parts)
     return GasFacts(
         float(pressures[peak]), math.remainder(float(angles[peak]), math.tau), float(pressures.min()),
         torque * math.tau / swept, torque, torque * point.speed,
