@@ -85,7 +85,7 @@ class Pump(Steam):
 
 def suction_point(pressure_ratio: float, clearance: float, exponent: float) -> float:
     """Return the part of the stroke where gas in the clearance has expanded to a ratio of its pressure (G17a)."""
-    return clearance / pressure_ratio ** (1.0 / exponent) - clearance
+    return float(clearance / pressure_ratio ** (1.0 / exponent)) - clearance
 
 
 class Compressor(Steam):

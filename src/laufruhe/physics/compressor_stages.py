@@ -86,8 +86,8 @@ def matched_pressures(stages: Sequence[Stage]) -> list[float] | None:
             moved = link.at(pressure)
             new = dict(zip((*link.before, *link.after), (*moved.before, *moved.after), strict=True))
             links = [
-                Link(each.pressure, tuple(new.get(s, s) for s in each.before), tuple(new.get(s, s) for s in each.after))
-                for each in links
+                Link(old.pressure, tuple(new.get(s, s) for s in old.before), tuple(new.get(s, s) for s in old.after))
+                for old in links
             ]
             links[k] = moved
         if change <= CLOSE:

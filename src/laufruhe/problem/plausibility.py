@@ -13,7 +13,7 @@ from laufruhe.errors import Complaint, ModelError
 from laufruhe.machine import Engine, OperatingPoint, PressureTrace
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.exact_angles import as_turn, reduced_turn
-from laufruhe.physics.gas_facts import GasFacts, gas_facts
+from laufruhe.physics.gas_facts import GasFacts, cylinder_facts, gas_facts
 from laufruhe.physics.pressure_trace import bottom_pressure
 from laufruhe.units import quantity_text
 
@@ -42,6 +42,8 @@ LATEST_PEAK = math.radians(60.0)
 """Largest usual angle between firing and peak pressure."""
 MAX_POWER = 250e6
 """Largest usual power over displacement [W/m^3]; racing engines without a supercharger reach 230 kW/l."""
+MAX_REST = 0.02
+"""Largest difference of mean torques that may be one of rounding, relative to the torque of gas and friction."""
 _ROUNDING = 1e-6
 
 
@@ -54,7 +56,11 @@ def plausibility_warnings(
     slider-cranks whose reciprocating mass is open, so that its start may be any.
     """
     warnings = [*_of_speed(engine, points), *_of_pistons(engine, open_masses), *_of_rotors(engine), *_of_mounts(engine)]
-    warnings += [*([] if fires_together else _of_firing(engine)), *_of_gas(engine, points)]
+    warnings += [
+        *([] if fires_together else _of_firing(engine)),
+        *_of_gas(engine, points),
+        *_of_machines(engine, points),
+    ]
     first: dict[str, Complaint] = {}
     for warning in warnings:
         first.setdefault(warning.where, warning)
@@ -177,6 +183,31 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
             rule = f"is {1e-6 * facts.power / facts.displacement:.3g} kW for each litre; racing engines reach 230 kW"
             pressure = "pressure_unit" if is_trace else "imep"
             yield Complaint("power of the gas", power, rule, f"check {pressure}, bore, stroke and speed")
+
+
+def _of_machines(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
+    # mean torque of coupled machines that gas and friction do not balance; a load torque takes what is left
+    for point in () if engine.load_torque is not None else points:
+        machines = (one for extra in engine.extras for one in extra.torques(point.name, engine.cycle.base_order))
+        driving = sum(float(one.on_crank.coefficients[0].real) for one in machines)
+        if not driving:
+            continue
+        with suppress(ModelError):
+            brake_torque = sum(facts.torque - facts.friction for _, facts in cylinder_facts(engine, point))
+            rest = brake_torque + driving
+            # a brake takes what an engine makes beyond its generator
+            if (
+                brake_torque * driving < 0.0
+                and abs(rest) > MAX_REST * abs(brake_torque)
+                and min(brake_torque, rest) < 0.0
+            ):
+                verbs = ("drives", "take") if brake_torque < 0.0 else ("brakes", "give")
+                rule = (
+                    f"{verbs[0]} the crank, and gas and friction {verbs[1]} {quantity_text(abs(brake_torque), 'N m')}; "
+                    f"the difference of {quantity_text(abs(rest), 'N m')} would change the speed"
+                )
+                remedy = f"give a sum of {quantity_text(-brake_torque, 'N m')}, or leave mean_torque out"
+                yield Complaint("mean torque of the electric machines", quantity_text(driving, "N m"), rule, remedy)
 
 
 def _of_trace(trace: PressureTrace, facts: GasFacts, period: float) -> Iterator[Complaint]:

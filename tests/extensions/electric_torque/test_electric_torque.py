@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result, Status
 from picture_faults import faults_of
+from problem_files import PROBLEMS
 
 MOUNTS = {"positions": [[f"{x} mm", f"{y} mm", "0 mm"] for x in (200, -200) for y in (250, -250)]}
 GAS = {"model": "seiliger", "peak_pressure": "75 bar", "imep": "5 bar"}
@@ -327,3 +329,28 @@ def test_half_orders_belong_to_four_stroke_engines() -> None:
     two_stroke = {"cycle": "two-stroke", "firing_order": [1, 2, 3], "throws": [0, 240, 120]}
     with pytest.raises(InputError, match="give an integer"):
         problem_of([machine(orders=[0.5])], engine=two_stroke, gas=None)
+
+
+@pytest.mark.parametrize(
+    ("text", "mean", "words"),
+    [
+        # the compressor takes 35.7 N m, the four-cylinder gives 101 N m
+        ("compressor", "80 N m", "drives the crank, and gas and friction take 35.69 N m; the difference of 44.31 N m"),
+        ("compressor", "20 N m", "the difference of 15.69 N m would change the speed; give a sum of 35.69 N m"),
+        ("compressor", "35.7 N m", ""),
+        ("engine", "-300 N m", "brakes the crank, and gas and friction give"),
+        ("engine", "-20 N m", ""),
+        ("engine", "20 N m", ""),
+    ],
+)
+def test_a_mean_torque_that_nothing_balances_is_doubted(text: str, mean: str, words: str) -> None:
+    """A motor that drives a compressor gives what the gas takes; beyond a generator a brake takes the rest."""
+    machines = [{"name": "motor", "mean_torque": mean}]
+    if text == "engine":
+        problem = problem_of(machines)
+    else:
+        tables = tomllib.loads((PROBLEMS / "compressor-two-stage.toml").read_text())
+        problem = load_tables({**tables, "electric_machines": machines}, Path("compressor.toml"))
+    doubts = [str(warning) for warning in problem.plausibility_warnings if "electric machines" in str(warning)]
+    assert len(doubts) == bool(words)
+    assert all(words in doubt for doubt in doubts)
