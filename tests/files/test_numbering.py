@@ -315,6 +315,19 @@ def test_a_crank_typed_against_the_rotation_is_named() -> None:
 
 
 @pytest.mark.parametrize(
+    ("typed", "keys", "fitting"),
+    [
+        ("flat-plane", {"numbering": "alternating", "firing_order": [1, 8, 4, 3, 6, 5, 7, 2]}, "cross-plane"),
+        ("cross-plane", {"first_bank": "right", "firing_order": [1, 8, 2, 7, 4, 5, 3, 6]}, "flat-plane"),
+    ],
+)
+def test_the_other_crank_that_an_order_fits_is_named(typed: str, keys: Table, fitting: str) -> None:
+    engine = {"layout": "vee", "bank_angle": 90, **keys}
+    assert f"it fits a {fitting} crank: if that is meant, leave out throws" in refusal({**engine, "throws": typed})
+    assert loaded({**engine, "throws": fitting})
+
+
+@pytest.mark.parametrize(
     ("keys", "line"),
     [
         ({"numbering": "odd"}, 'is neither a list nor "one bank after the other" nor "alternating"'),

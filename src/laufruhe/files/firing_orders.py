@@ -17,6 +17,7 @@ from laufruhe.files.engine import EngineTable, cycle_of, idle_cylinders, layout_
 from laufruhe.files.numbering import ALTERNATING, BY_BANK, KEYS, USUAL, place_order
 from laufruhe.files.toml_text import toml_value
 from laufruhe.machine import Cycle, SliderCrank
+from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.machine.firing import from_one, intervals_of
 from laufruhe.numerics.exact_angles import Turn, as_turn, reduced_turn
 
@@ -167,7 +168,18 @@ def _exchange(table: EngineTable, order: Sequence[int]) -> str:
         fit = _fit(table.model_copy(update={"firing_order": changed}))
         if fit is not None and not fit.pairs and fit.spread < _CLEAR:
             return f"check the order; with {a} and {b} exchanged it fits: {_text(changed)}"
-    return "check the order, which no usual numbering makes fit"
+    crank = _other_crank(table)
+    other = f"; it fits a {crank} crank: if that is meant, leave out throws" if crank else ""
+    return f"check the order, which no usual numbering makes fit{other}"
+
+
+def _other_crank(table: EngineTable) -> str:
+    # name of the crank on which the order fires evenly; empty if it has none
+    free = table.model_copy(update={"throws": None})
+    if table.throws is None or (fit := _fit(free)) is None or fit.pairs:
+        return ""
+    layout = layout_of(free)
+    return name_of_crank([fit.parts[layout.pins.index(pin)].throw for pin in range(len(layout.throw_positions))])
 
 
 def _reading(table: EngineTable) -> tuple[Mapping[str, Any], _Fit] | None:
