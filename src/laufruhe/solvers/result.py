@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
@@ -70,6 +70,20 @@ class Status(StrEnum):
         return self in (Status.OPTIMAL, Status.FEASIBLE)
 
 
+class ResultDetails:
+    """Additional data of a result that an extension provides."""
+
+    @property
+    def measured(self) -> Evaluation | None:
+        """Evaluation whose objective the result states; None for the evaluation of the final design."""
+        return None
+
+    @property
+    def lines(self) -> Sequence[str]:
+        """Lines of a printed result after those of the decisions."""
+        return ()
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ResultContent:
     """Content of a result, solved now or read from a file; the fields are named as in `Result`."""
@@ -81,6 +95,7 @@ class ResultContent:
     limits: tuple[LimitValue, ...] = ()
     message: str = ""
     conflict: tuple[str, ...] = ()
+    details: ResultDetails | None = None
 
     @property
     def name(self) -> str:
@@ -126,6 +141,7 @@ class ResultContent:
         if self.certificate is not None:
             lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
         lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in relevant_decisions(self.decisions)]
+        lines += [f"  {line}" for line in (self.details.lines if self.details is not None else ())]
         if self.message:
             lines.append(f"  {self.message}")
         return "\n".join(lines) + ">"
@@ -133,15 +149,6 @@ class ResultContent:
     def _repr_html_(self) -> str:
         lines = [html.escape(line.strip()) for line in repr(self).strip("<>").splitlines()]
         return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
-
-
-class ResultDetails:
-    """Additional data of a result that an extension provides."""
-
-    @property
-    def measured(self) -> Evaluation | None:
-        """Evaluation whose objective the result states; None for the evaluation of the final design."""
-        return None
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -186,7 +193,6 @@ class Result(ResultContent):
     error: Callable[[], float] = float
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
-    details: ResultDetails | None = None
     ranks: tuple[RankValue, ...] = ()
     reached: tuple[AttainableLimit, ...] = ()
     nearest: NearestDesign | None = None

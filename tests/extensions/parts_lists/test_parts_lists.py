@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,15 @@ from extensions.parts_lists.scenes import random_scene
 from lanes import first_fast
 from laufruhe.errors import BoundError, InputError, LaufruheError, SolverError
 from laufruhe.extensions.parts_lists import solver
-from laufruhe.extensions.parts_lists.lists import RANKED, Choices, Outcome
+from laufruhe.extensions.parts_lists.lists import RANKED, Outcome
 from laufruhe.extensions.parts_lists.section import SECTION
-from laufruhe.files.reader import load
+from laufruhe.files.reader import load, load_tables
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import methods, solve
 from laufruhe.solvers.result import Result, Status
-from problem_files import FOUR, MOUNTS
+from problem_files import FOUR, MOUNTS, PROBLEMS
 
 CLOSE = 1e-6
 STOPS = (0, 1, 2, 5, 9, 20)
@@ -32,10 +33,8 @@ ROWS = "name, mass [kg], price\nsmall, 0.5, 9\nmiddle, 1.5, 6\nlarge, 3.0, 4\n"
 
 
 def outcome_of(result: Result) -> Outcome:
-    choices = result.problem.extra(Choices)
-    assert choices is not None
-    assert choices.outcome is not None
-    return choices.outcome
+    assert isinstance(result.details, Outcome)
+    return result.details
 
 
 @pytest.fixture
@@ -241,3 +240,32 @@ def test_report_shows_rows_and_counts(read: Callable[..., Problem]) -> None:
     record = SECTION.record(result)
     assert record["combinations"] == 3
     assert record["rows"] == {"weight": ["small", "middle", "large"][row]}
+
+
+def test_a_result_names_its_rows_and_without_a_design_the_nearest_row(tmp_path: Path) -> None:
+    """The cheapest flywheel that keeps the limit is printed; under a sharper limit the heaviest is nearest."""
+    tables = tomllib.loads((PROBLEMS / "compressor-two-stage.toml").read_text())
+    tables["counterweights"][0] |= {"unbalance": "76 kg mm", "angle": 180}
+    tables["engine"]["single_cylinders"][0]["reciprocating_mass"] = "1.9 kg"
+    tables["choices"] = [{"name": "flywheel", "file": "f.csv", "parts": ["flywheel"]}]
+    tables |= {"parts_price": {"total": 180}, "objective": {"minimise": "parts price"}}
+    (tmp_path / "f.csv").write_text("name, inertia [kg m^2], price\nA, 0.6, 180\nB, 1.2, 240\nC, 2.4, 330\n")
+
+    def solved_at(degree: float) -> Result:
+        limit = [{"limit": "degree of irregularity", "max": degree}]
+        return solve(load_tables({**tables, "constraints": limit}, tmp_path / "compressor.toml"))
+
+    first, *others = (solved_at(degree) for degree in (1.0, 1e-9))
+    needed = first.limits[0].value
+    result = solved_at(0.6 * needed)
+    assert outcome_of(result).rows == {"flywheel": "B"}
+    assert "\n  flywheel: B" in repr(result)
+    (without,) = others
+    assert without.status is Status.INFEASIBLE
+    assert without.message.endswith("; 'C' is nearest")
+    assert without.nearest is not None
+    alone = {**tables, "flywheel": {"inertia": "2.4 kg m^2"}, "choices": [], "parts_price": {"total": 330}}
+    alone["constraints"] = [{"limit": "degree of irregularity", "max": 1.0}]
+    heaviest = solve(load_tables(alone, tmp_path / "compressor.toml")).limits[0].value
+    assert without.nearest.value == pytest.approx(heaviest, rel=1e-9)
+    assert heaviest < 0.3 * needed

@@ -17,6 +17,7 @@ from laufruhe.files.complaints import Refused, key_path, nearest
 from laufruhe.files.edits import keys_by_name
 from laufruhe.files.nested import Place, at, with_value_at
 from laufruhe.problem.problem import Extra
+from laufruhe.solvers.result import ResultDetails
 
 Tables: TypeAlias = Mapping[str, Any]
 Subset: TypeAlias = tuple[tuple[int, ...], ...]
@@ -137,13 +138,23 @@ class Combination:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(ResultDetails):
     """Outcome of a choice: combinations that were solved, the best first, and numbers of all and of excluded ones."""
 
     lists: tuple[PartsList, ...]
     solved: tuple[Combination, ...]
     whole: int
     excluded: int
+
+    @property
+    def rows(self) -> dict[str, str]:
+        """Names of the chosen rows by the names of the lists."""
+        return dict(zip((parts.name for parts in self.lists), self.names(self.solved[0]), strict=True))
+
+    @property
+    def lines(self) -> list[str]:
+        """Chosen rows as lines of a printed result."""
+        return [f"{name}: {row}" for name, row in self.rows.items()]
 
     def names(self, known: Combination) -> list[str]:
         """Return the names of the rows of a combination."""
@@ -158,10 +169,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Choices(Extra):
-    """Choice of one row of each list; with its outcome after the solve."""
+    """Choice of one row of each list."""
 
     lists: tuple[PartsList, ...]
-    outcome: Outcome | None = None
     words: ClassVar[str] = "the choice from lists of parts"
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import counted
-from laufruhe.extensions.parts_lists.lists import RANKED, Choices, Outcome
+from laufruhe.extensions.parts_lists.lists import RANKED, Outcome
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import figure, number
 from laufruhe.present.tables import Table
@@ -16,8 +16,7 @@ from laufruhe.solvers.result import Result
 
 
 def _outcome(result: Result) -> Outcome | None:
-    choices = result.problem.extra(Choices)
-    return choices.outcome if choices is not None else None
+    return result.details if isinstance(result.details, Outcome) else None
 
 
 def _tables(result: Result) -> list[Table]:
@@ -68,7 +67,7 @@ def _record(result: Result) -> dict[str, Any]:
         }
         for known in outcome.solved
     ]
-    return {"combinations": outcome.whole, "excluded": outcome.excluded, "rows": solved[0]["rows"], "solved": solved}
+    return {"combinations": outcome.whole, "excluded": outcome.excluded, "rows": outcome.rows, "solved": solved}
 
 
 SECTION = Section(

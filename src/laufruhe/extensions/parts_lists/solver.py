@@ -31,9 +31,9 @@ from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, Fathom
 from laufruhe.prove.certificate import USELESS_GAP, Proof, ProofStrength, make_certificate
 from laufruhe.prove.witness import Witness
 from laufruhe.solvers import methods
-from laufruhe.solvers.conclusion import FEASIBILITY_TOL, failed_result, infeasible_result
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, failed_result, infeasible_result, nearest_record
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.values import ObjectiveValue
+from laufruhe.solvers.values import NearestDesign, ObjectiveValue
 from laufruhe.solvers.walk import check_by_walk
 
 MAX_NODES, MAX_WHOLE = 200_000, 10_000_000
@@ -80,7 +80,9 @@ def solve_choices(problem: Problem, decide: methods.Decide, max_nodes: int = MAX
         if bound < math.inf:
             result = failed_result(problem, initial, [limit.name for limit in problem.limits], timing)
             text = "; ".join(filter(None, (result.message, faults)))
-        return replace(result, message=text)
+        elif search.nearest is not None:
+            text += f"; {search.nearest[0]} is nearest"
+        return replace(result, message=text, nearest=search.nearest and search.nearest[1])
     checked = check_by_walk(best.problem, best, time.thread_time() - spent)
     # a walk may refute the bound
     best, bound = checked, bound if checked is best else 0.0
@@ -95,10 +97,9 @@ def solve_choices(problem: Problem, decide: methods.Decide, max_nodes: int = MAX
         # the bound of the best combination is above its value by errors of sampling at most
         max(_bound_of(best) + search.price - value, 0.0),
     )  # fmt: skip
-    extras = tuple(replace(extra, outcome=outcome) for extra in problem.extras if isinstance(extra, Choices))
     return replace(
-        best, problem=replace(best.problem, extras=extras, objective=problem.objective), initial=initial,
-        timing=timing, certificate=certificate,
+        best, problem=replace(best.problem, extras=problem.extras, objective=problem.objective), initial=initial,
+        details=outcome, timing=timing, certificate=certificate,
         status=Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
         message="; ".join(filter(None, (best.message, faults))),
@@ -127,6 +128,7 @@ class _Search(BranchAndBound[Subset]):
         self.solved: dict[tuple[int, ...], Combination] = {}
         self.best: Result | None = None
         self.price = 0.0
+        self.nearest: tuple[str, NearestDesign] | None = None
         self.values, self.faults = list[float](), list[str]()
 
     def problem_of(self, subset: Subset) -> Problem:
@@ -200,8 +202,10 @@ class _Search(BranchAndBound[Subset]):
         if rows in self.solved:
             return self.solved[rows]
         value, bound, proof, reason = math.inf, 0.0, "not solved", ""
+        names = ", ".join(f"'{parts.rows[k][0]}'" for parts, k in zip(self.lists, rows, strict=True))
+        problem = self.problem_of(tuple((row,) for row in rows))
         try:
-            result, price = self._decided(self.problem_of(tuple((row,) for row in rows)))
+            result, price = self._decided(problem)
         except _UNSOLVED as error:
             reason = str(error)
         else:
@@ -216,8 +220,12 @@ class _Search(BranchAndBound[Subset]):
                     self.best, self.price, self.value, self.witness = result, price, value, witness
             elif result.status is not Status.INFEASIBLE:
                 reason = result.message
+            elif not problem.decisions:
+                # with open numbers the design of the result is the initial one
+                record = nearest_record(problem, result.final, ())
+                if self.nearest is None or record.violation < self.nearest[1].violation:
+                    self.nearest = names, record
         if reason:
-            names = ", ".join(f"'{parts.rows[k][0]}'" for parts, k in zip(self.lists, rows, strict=True))
             self.faults.append(f"{names} ({reason})")
         self.solved[rows] = Combination(rows, value, bound, proof)
         return self.solved[rows]
