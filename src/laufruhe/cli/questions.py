@@ -158,7 +158,13 @@ def _read(question: _Question, answers: Answers, usual: str, text: str) -> tuple
     if text == _BACK:
         raise _Back
     values = question.read(question.key, text or usual, answers)
-    _check({**answers, **values})
+    try:
+        _check({**answers, **values})
+    except InputError as error:
+        # a complaint about another key names it
+        first = error.complaints[0]
+        key = "" if re.sub(r"\[\d+\]", "", first.where) in values else f"{first.where}: "
+        raise refused(first.where, first.value, f"{key}{first.rule}", first.remedy) from None
     return values, not text
 
 
@@ -225,6 +231,13 @@ def _value(text: str) -> int | float | str:
 
 def _number(key: str, text: str, _: Answers) -> Answers:
     return {key: _value(text)}
+
+
+def _angle(key: str, text: str, _: Answers) -> Answers:
+    # degrees, with or without their unit
+    value = _value(text)
+    angle = _parsed(text if isinstance(value, str) else f"{text} deg", "rad", key)
+    return {key: round(math.degrees(angle), 9) if isinstance(value, str) else value}
 
 
 def _choice(key: str, text: str, _: Answers) -> Answers:
@@ -359,8 +372,10 @@ def _has_throws(answers: Answers) -> bool:
 
 
 def _length(answers: Answers, key: str) -> float:
+    # the reader refuses an impossible length
     with suppress(units.UnitError):
-        return units.parse(str(answers.get(f"engine.{key}", "")), "m")
+        length = units.parse(str(answers.get(f"engine.{key}", "")), "m")
+        return length if length > 0.0 else 0.08
     return 0.08
 
 
@@ -396,8 +411,8 @@ _LAYOUT = (
     _Question("engine.cycle", "Cycle", "four-stroke", _choice),
     _Question("engine.cylinders", "Cylinders", "4", _number),
     _Question("fuel", "Fuel, which sets usual pressures and masses", "petrol", _fuel),
-    _Question("engine.bank_angle", "Angle between the banks [deg]", "90", _number, _is_vee),
-    _Question("engine.split_pin_angle", "Split pins: angle by which the right bank's pin leads [deg]", "0", _number,
+    _Question("engine.bank_angle", "Angle between the banks [deg]", "90", _angle, _is_vee),
+    _Question("engine.split_pin_angle", "Split pins: angle by which the right bank's pin leads [deg]", "0", _angle,
               _is_vee),
     _Question("engine.numbering", "Numbers of the cylinders", BY_BANK, _choice, _has_banks),
     _Question("engine.first_bank", "Bank of cylinder 1, seen from the flywheel", "left", _choice,
