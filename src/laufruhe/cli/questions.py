@@ -284,7 +284,8 @@ def _intervals(key: str, text: str, answers: Answers) -> Answers:
     cycle = 720.0 if answers["engine.cycle"] == str(Cycle.FOUR_STROKE) else 360.0
     if len(degrees) == _count(answers) - 1:
         degrees.append(_value(f"{cycle - sum(degrees):g}"))  # type: ignore[arg-type]
-    if len(numbers) > len(degrees) or len(degrees) != _count(answers) or abs(sum(degrees) - cycle) > 1e-6:
+    is_whole = len(numbers) <= len(degrees) == _count(answers) and abs(sum(degrees) - cycle) <= 1e-6
+    if not is_whole or min(degrees) < 0.0:
         rule = f"does not divide the {cycle:g} deg of a cycle into {_count(answers)} intervals"
         raise refused(key, text, rule, "write even, or angles such as 270-450")
     return {key: [] if len(set(degrees)) == 1 else degrees}
