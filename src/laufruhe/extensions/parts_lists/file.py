@@ -94,7 +94,7 @@ def _choices(tables: list[ChoiceTable], problem: Problem, context: ExtensionCont
     if len(tables) > MAX_LISTS:
         raise Refused("choices", None, f"has {len(tables)} lists", f"choose from at most {MAX_LISTS} at once")
     lists = tuple(_list(table, context, f"choices[{k}]") for k, table in enumerate(tables, 1))
-    return replace(problem, extras=(*problem.extras, Choices(lists)))
+    return replace(problem, extras=(*problem.extras, Choices(lists))) if lists else problem
 
 
 def _price(table: PartsPriceTable, problem: Problem, _: ExtensionContext) -> Problem:
