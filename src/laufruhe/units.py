@@ -110,6 +110,20 @@ class UnitError(ValueError):
     """Text that is no number with a unit of the required dimension; rule and remedy, separated by '; '."""
 
 
+class GaugePressureError(UnitError):
+    """Pressure above that of the air, with the same number as a mean pressure.
+
+    Attributes
+    ----------
+    absolute
+        Rule and remedy for a key that is an absolute pressure.
+    """
+
+    def __init__(self, absolute: str, mean: str) -> None:
+        super().__init__(f"{absolute}, or {mean} for a mean pressure")
+        self.absolute = absolute
+
+
 @cache
 def _registry() -> pint.UnitRegistry[Any]:
     import pint
@@ -262,9 +276,7 @@ def _refuse_mark(number: str, unit: str, gauge: str | None) -> None:
     if not gauge:
         raise UnitError(f"has a mark, and pressures are absolute without one; write {plain}")
     bars = 1e-5 * (float(number) * _factor(unit, "Pa") + ATMOSPHERE)
-    raise UnitError(
-        f'is a gauge pressure, above that of the air; write "{bars:.4g} bar", or {plain} for a mean pressure'
-    )
+    raise GaugePressureError(f'is a gauge pressure, above that of the air; write "{bars:.4g} bar"', plain)
 
 
 def unit_of(text: str) -> str:

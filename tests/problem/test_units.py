@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+import tomllib
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -12,7 +14,10 @@ from hypothesis import strategies as st
 
 import laufruhe.units
 from laufruhe import units as module
+from laufruhe.errors import InputError
+from laufruhe.files.reader import load_tables
 from laufruhe.units import COMMON, UnitError, dimension_name, dimension_of, example, parse, quantity_text
+from problem_files import FOUR
 
 GRAVITY = 9.80665
 DIMENSIONS = ["m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "rad", "rad/s", "m/s", ""]
@@ -170,6 +175,13 @@ class TestParse:
         with pytest.raises(UnitError) as caught:
             parse(text, "Pa")
         assert str(caught.value) == said
+
+    @pytest.mark.parametrize(("key", "is_mean"), [("imep", True), ("peak_pressure", False), ("intake_pressure", False)])
+    def test_marks_of_gauges_suggest_a_mean_pressure_where_the_key_is_one(self, key: str, is_mean: bool) -> None:
+        with pytest.raises(InputError) as caught:
+            load_tables({**tomllib.loads(FOUR), "operating_points": [{"speed": "900 rpm", key: "100 psig"}]}, Path("f"))
+        assert '"100 psig": is a gauge pressure, above that of the air; write "7.908 bar"' in str(caught.value)
+        assert ('or "100 psi" for a mean pressure' in str(caught.value)) is is_mean
 
     def test_plain_numbers_are_shown_as_a_file_has_them(self) -> None:
         """Without quotes, and without a unit that they have not."""

@@ -137,6 +137,9 @@ class Number:
         if isinstance(raw, str):
             try:
                 return units.parse(raw, self.unit)
+            except units.GaugePressureError as error:
+                # absolute pressures are positive, mean pressures may be negative
+                raise refusal(error.absolute if self.above == 0.0 else str(error)) from None
             except units.UnitError as error:
                 raise refusal(_without_note(raw) or str(error)) from None
         if self.unit and self.plain is None:

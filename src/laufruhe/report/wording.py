@@ -19,7 +19,7 @@ from laufruhe.solvers.values import AttainableLimit
 
 # largest relative change that is printed as zero
 NO_CHANGE = 5e-4
-NO_BOUND = "no useful lower bound was found in the time given"
+NO_BOUND = "no useful lower bound was found"
 NEGLIGIBLE = 1e-9
 """Relative error of the objective that is not stated as a number."""
 ADDED = 0.01
