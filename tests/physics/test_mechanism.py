@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,6 +48,15 @@ def test_the_transform_stops_where_the_tail_is_gone() -> None:
     table = np.abs(mechanism.momentum_orders(part)[0])
     assert len(table) > 64
     assert table[-1] < 1e-15 * table.max()
+
+
+def test_masses_do_not_decide_how_many_orders_there_are() -> None:
+    """Loads are affine in the masses: a signal with kinks beside them is then the same for every mass."""
+    part = SliderCrank("part", 0.0, 0.05, 0.14, 1.0, offset=0.01, rod_inertia_deficit=-0.002)
+    tables = [mechanism.momentum_orders(replace(part, reciprocating_mass=mass)) for mass in (0.0, 1e-9, 0.3, 1.5)]
+    assert len({table.shape for table in tables}) == 1
+    mixed = 0.8 * tables[0] + 0.2 * tables[3]
+    assert np.abs(tables[2] - mixed).max() <= 1e-15 * np.abs(tables[2]).max()
 
 
 def test_a_crank_that_all_but_locks_is_refused() -> None:

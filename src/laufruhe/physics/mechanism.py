@@ -162,16 +162,34 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
 
     They are axial and transverse force, and the roll moments of point masses and of swings.
     """
-    radius = part.crank_radius
-
-    def rows(alpha: Array) -> tuple[Any, ...]:
-        force, roll, rods = momentum_loads(part, part.motion(np, alpha), 1.0)
-        return np.real(force), np.imag(force), roll, rods
-
-    table = resolved_orders(rows, np.array([1.0, 1.0, radius, radius])[:, None], part.name)
-    # a periodic momentum has no mean derivative
-    table[:, 0] = 0.0
+    motion = part.motion(np, np.zeros(1))
+    masses = np.array([mass for mass, _ in (*motion.points, *motion.swings)])
+    table = np.tensordot(masses, _unit_orders(part.only({})), 1)
     table.setflags(write=False)
+    return table
+
+
+@lru_cache(maxsize=256)
+def _unit_orders(part: SliderCrank) -> ComplexArray:
+    """Return the loads of a unit of each mass and inertia of the motion, shape (masses, 4, orders).
+
+    No mass decides how many orders there are, so loads are affine in the masses, also beside a signal with kinks.
+    """
+
+    def rows(alpha: Array) -> list[Any]:
+        motion = part.motion(np, alpha)
+        units = [Motion(((1.0, moved),)) for _, moved in motion.points]
+        units += [Motion((), ((1.0, moved),)) for _, moved in motion.swings]
+        loads = [momentum_loads(part, unit, 1.0) for unit in units]
+        return [row for force, roll, rods in loads for row in (np.real(force), np.imag(force), roll, rods)]
+
+    radius = part.crank_radius
+    # forces and roll moment of a unit mass, roll moment of a unit inertia
+    scale = np.array([radius, radius, radius**2, 1.0])
+    count = len(rows(np.zeros(1))) // len(scale)
+    table = resolved_orders(rows, np.tile(scale, count)[:, None], part.name).reshape(count, len(scale), -1)
+    # a periodic momentum has no mean derivative
+    table[:, :, 0] = 0.0
     return table
 
 
