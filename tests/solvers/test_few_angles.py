@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import laufruhe
@@ -257,3 +258,18 @@ def test_stiffness_is_bounded_by_what_the_cycle_has(samples: int) -> None:
     assert result.certificate.lower_bound <= LEAST * (1.0 + 1e-6)
     assert result.status is Status.OPTIMAL
     assert result.objective.value == pytest.approx(LEAST, rel=1e-4)
+
+
+@pytest.mark.parametrize("mass", [0.3, 1.5])
+def test_piston_masses_beside_gas_act_as_the_exact_engine(mass: float) -> None:
+    """Few angles list few orders of the gas; inertia lists more, and there the kinks of the gas count too."""
+    engine = SINGLE["engine"] | {
+        "cycle": "four-stroke", "bore": "80 mm", "reciprocating_mass": {"between": ["0.3 kg", "1.5 kg"]},
+    }  # fmt: skip
+    gas = {"gas": {"model": "seiliger", "peak_pressure": "60 bar", "imep": "7 bar"}}
+    tables = {key: own for key, own in SINGLE.items() if key != "balancer_shafts"} | gas
+    tables |= {"engine": engine, "objective": {"minimise": "rms roll moment"}}
+    problem = load_tables(tables, Path("single.toml"))
+    model, (measure,) = AffineModel(problem), problem.measures
+    exact = evaluate(problem, problem.design([mass], problem.unbalances), samples=1440).value(measure)
+    assert model.norm(measure, 1440).value(np.array([mass])) == pytest.approx(exact, rel=1e-13)

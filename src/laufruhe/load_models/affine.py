@@ -290,9 +290,8 @@ class AffineModel:
     def spectra(self, channel: LoadChannel) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
         """Return, for each operating point, a load without the open unbalances, and that of one unit of each."""
         signals = self.bare.signals(channel)
-        return [
-            (bare, tuple(map(channel.signal, columns))) for bare, columns in zip(signals, self._slopes, strict=True)
-        ]
+        columns = [tuple(map(channel.signal, slopes)) for slopes in self._slopes]
+        return [(_listed(bare, units), units) for bare, units in zip(signals, columns, strict=True)]
 
     def norm(self, measure: Measure, samples: int, averaged: bool = False, peaks: int = 0) -> AffineNorm:
         """Return a measure as the norm of load rows that are affine in the decision vector.
@@ -395,6 +394,14 @@ def _loads(
     forces = mounting.forces(wrench, point.speed) if mounting else None
     travel = travel_of(problem.engine, mounting, wrench, point.speed)
     return PointLoads(point, wrench, forces, travel, parts, without_gas)
+
+
+def _listed(bare: Spectrum, columns: Sequence[Spectrum]) -> Spectrum:
+    # the orders of its kinks that a sum with the columns lists, because means count listed orders alone (L5a)
+    for column in columns:
+        if bare.kinks is not None and column.orders[-1] > bare.orders[-1]:
+            bare = bare + column.mapped(np.zeros_like)
+    return bare
 
 
 def _stacked(bare: Rows, slopes: Iterable[Array], count: int, keep_all: bool) -> AffineNorm:
