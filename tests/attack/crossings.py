@@ -205,6 +205,8 @@ def ranks_with_limits(rng: Generator) -> Table:
 
 
 SPREAD = 0.05
+STEEP_CHARGE = 1e5
+"""Share of the objective that a limit of a rank is worth per share of its excess, at most."""
 
 
 def robust_and_star(rng: Generator) -> Table:
@@ -322,13 +324,15 @@ def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
             verdict.wrong.append(f"{rank.name} is said to be {rank.final:.9g} and is {own.objective:.9g}")
         if own.worst > 3e-5:
             verdict.wrong.append(f"a limit is passed by {own.worst:.2e} of itself")
-        rival = convex_rival(stage, vector, {}, rank.minimum * (1.0 - 2e-5))
+        rival = convex_rival(stage, vector, {}, rank.minimum * (1.0 - 2e-5), STEEP_CHARGE)
         verdict.rivals += rival.looked_at
-        if rival.violation <= 1e-6:
-            if rank.lower_bound > rival.value * (1.0 + reading) + floor:
-                verdict.wrong.append(f"{rank.name}: bound {rank.lower_bound:.9g}, a rival has {rival.value:.9g}")
-            if str(rank.proof) == "global" and rank.minimum > rival.value * (1.0 + 1e-4 + reading) + floor:
-                verdict.wrong.append(f"{rank.name}: global {rank.minimum:.9g}, a rival has {rival.value:.9g}")
+        if rival.violation <= KEPT:
+            # what a rival passes a limit by is charged: near the best of a rank before, any share is worth much
+            best = rival.value * (1.0 + STEEP_CHARGE * max(rival.violation, 0.0))
+            if rank.lower_bound > best * (1.0 + reading) + floor:
+                verdict.wrong.append(f"{rank.name}: bound {rank.lower_bound:.9g}, a rival has {best:.9g}")
+            if str(rank.proof) == "global" and rank.minimum > best * (1.0 + 1e-4 + reading) + floor:
+                verdict.wrong.append(f"{rank.name}: global {rank.minimum:.9g}, a rival has {best:.9g}")
         if rank.limit is not None:
             quantity = told["minimise"]
             rest = {key: value for key, value in told.items() if key != "minimise"}

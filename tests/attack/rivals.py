@@ -47,10 +47,12 @@ def designs_told(openings: Openings) -> Iterator[Table]:
         yield {}
 
 
-def convex_rival(openings: Openings, start: np.ndarray, told: Table, enough: float = np.inf) -> Rival:
+def convex_rival(
+    openings: Openings, start: np.ndarray, told: Table, enough: float = np.inf, charge: float = 1e3
+) -> Rival:
     """Where unbalances alone are open; looked for until none under `enough` can be left."""
     program = Program(openings, told)
-    found = program.minimum(start, enough=enough)
+    found = program.minimum(start, enough=enough, charge=charge)
     if found.violation > KEPT:
         minimum = program.minimum_violation(found.vector)
         if minimum.violation <= KEPT:
