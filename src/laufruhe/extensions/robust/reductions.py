@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import import_module
-from typing import Any
+from functools import partial
 
 from laufruhe.extensions.robust.assembly import Assembly
 from laufruhe.extensions.robust.tolerance import Robust
+from laufruhe.numerics.processes import call_by_name
 from laufruhe.solvers.methods import Reduction
 
+_HERE = "laufruhe.extensions.robust"
 
-def _from(module: str, function: str) -> Callable[..., Any]:
-    # solvers are imported when a problem needs them
-    return lambda *arguments: getattr(import_module(f"laufruhe.extensions.robust.{module}"), function)(*arguments)
-
-
+# solvers are imported when a problem needs them
 ASSEMBLY = Reduction(
     "assembly", lambda problem: problem.extra(Assembly) is not None,
-    _from("assembly_solver", "solve_assembly"), _from("assembly_solver", "refuse"), "constant limits",
+    partial(call_by_name, f"{_HERE}.assembly_solver:solve_assembly"),
+    partial(call_by_name, f"{_HERE}.assembly_solver:refuse"), "constant limits",
 )  # fmt: skip
 TOLERANCES = Reduction(
     "tolerances", lambda problem: problem.extra(Robust) is not None,
-    _from("solver", "solve_built"), _from("solver", "refuse"), "constant limits",
+    partial(call_by_name, f"{_HERE}.solver:solve_built"), partial(call_by_name, f"{_HERE}.solver:refuse"),
+    "constant limits",
 )  # fmt: skip
