@@ -89,6 +89,7 @@ COMMON = {
            "N/mm^2": 1e6},
     "N": {"N": 1.0, "kN": 1e3, "kp": 9.80665},
     "N m": {"N m": 1.0, "kN m": 1e3},
+    "W": {"W": 1.0, "kW": 1e3},
     "N m/rad": {"N m/rad": 1.0},
     "N m s/rad": {"N m s/rad": 1.0},
     "N s/m": {"N s/m": 1.0},

@@ -12,6 +12,7 @@ import pytest
 
 import laufruhe
 from cli import scenes
+from laufruhe.present.gas_figures import gas_head, gas_rows
 from laufruhe.present.tables import Table, escape_markdown, strip_markdown
 from laufruhe.report.document import Bullets, Document, Paragraph
 from laufruhe.report.result_report import result_document
@@ -149,6 +150,23 @@ def test_a_reader_gets_units_of_his_choice() -> None:
                     seen.add(unit.group(1))
     assert seen >= {"N", "g mm", "mm"}
     assert readable("N") == ("N", 1.0)
+
+
+def test_torque_and_power_have_units_of_choice_and_unbalances_those_of_mass_and_length() -> None:
+    """735.49875 W are a PS; 0.45359237 kg times 0.0254 m are a lb in."""
+    text = (PROBLEMS / "compressor-two-stage.toml").read_text(encoding="utf-8")
+    units = 'units = { mass = "lb", length = "in", torque = "kp m", power = "PS", inertia = "kg cm^2" }\n'
+    problem = laufruhe.load(units + text)
+    with shown_in(dict(problem.shown_units)):
+        ((_, *rows), head) = (gas_rows(problem)[0], gas_head())
+        assert readable("kg m", "g mm") == ("lb in", pytest.approx(1.0 / (0.45359237 * 0.0254), rel=1e-12))
+        assert readable("kg m^2") == ("kg cm²", pytest.approx(1e4, rel=1e-12))
+    usual = gas_rows(problem)[0][1:]
+    assert gas_head()[4:] == ("gas torque [N m]", "gas power [kW]", "power [kW/l]", "brake torque [N m]")
+    assert head[4:] == ("gas torque [kp m]", "gas power [PS]", "power [PS/l]", "brake torque [kp m]")
+    factors = (1.0, 1.0, 1.0, 9.80665, 0.73549875, 0.73549875, 9.80665)
+    for mine, theirs, factor in zip(rows, usual, factors, strict=True):
+        assert float(mine) * factor == pytest.approx(float(theirs), rel=2e-3)
 
 
 def test_units_of_another_dimension_are_refused() -> None:

@@ -16,6 +16,7 @@ from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.methods import refuse
+from laufruhe.units import shown_in
 
 
 def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
@@ -40,7 +41,9 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
 
         return as_json(evaluate_only(problem, allow_resonance=True))
 
-    return "".join(f"{line}\n" for line in (f"ok: {problem.summary}", *gas_lines(drawing), *loads)), initial_as_json
+    with shown_in(dict(problem.shown_units)):
+        lines = (f"ok: {problem.summary}", *gas_lines(drawing), *loads)
+    return "".join(f"{line}\n" for line in lines), initial_as_json
 
 
 def warn(problem: Problem, path: Path) -> None:

@@ -152,15 +152,23 @@ class UnitsTable(Table):
 
     force: str | None = f.optional("Unit of forces.")
     mass: str | None = f.optional("Unit of masses.")
-    unbalance: str | None = f.optional("Unit of unbalances.")
+    unbalance: str | None = f.optional("Unit of unbalances; that of mass times that of length, if both are given.")
     length: str | None = f.optional("Unit of lengths.")
+    torque: str | None = f.optional("Unit of torques, moments and couples.")
+    inertia: str | None = f.optional("Unit of moments of inertia.")
+    power: str | None = f.optional("Unit of power.")
 
     def by_si_unit(self) -> tuple[tuple[str, str], ...]:
         """Return pairs of an SI unit and a unit in its place; raise `Refused` for a unit of another dimension."""
-        named = {"N": "force", "kg": "mass", "kg m": "unbalance", "m": "length"}
+        named = {
+            "N": "force", "kg": "mass", "kg m": "unbalance", "m": "length", "N m": "torque", "kg m^2": "inertia",
+            "W": "power",
+        }  # fmt: skip
         units = {si: getattr(self, key) for si, key in named.items() if getattr(self, key) is not None}
         for si, unit in units.items():
             si_value(f"1 {unit}", si, f"units.{named[si]}", unit)
+        if self.mass is not None and self.length is not None:
+            units.setdefault("kg m", f"{self.mass} {self.length}")
         return tuple(units.items())
 
 

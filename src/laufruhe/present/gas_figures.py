@@ -12,14 +12,21 @@ from laufruhe.physics.compressor_stages import Stage, links_of, matched_pressure
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
 from laufruhe.present.numbers import DEGREE, share, trimmed
 from laufruhe.problem.problem import Problem
+from laufruhe.units import readable
 
-HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "gas torque [N m]", "gas power [kW]", "power [kW/l]",
-        "brake torque [N m]")  # fmt: skip
-"""Heads of the figures of the gas, before friction; the last one is after it."""
 _EXCESS = 0.005
 """Largest relative difference between delivery and intake of two stages that needs no sentence."""
 _LINES = 8
 """Largest number of operating points with a line of their own."""
+
+
+def gas_head() -> tuple[str, ...]:
+    """Return the heads of the figures of the gas, before friction; the last one is after it."""
+    torque, power = readable("N m")[0], readable("W", "kW")[0]
+    return (
+        "at", "peak [bar]", "peak at [deg]", "imep [bar]", f"gas torque [{torque}]", f"gas power [{power}]",
+        f"power [{power}/l]", f"brake torque [{torque}]",
+    )  # fmt: skip
 
 
 def gas_rows(problem: Problem) -> list[tuple[str, ...]]:
@@ -85,10 +92,11 @@ def _names(stages: Sequence[Stage]) -> str:
 def gas_lines(problem: Problem) -> list[str]:
     """Return the sentences of `gas_note`, and a line for each operating point with gas."""
     lines, rows = [f"gas: {sentence}" for sentence in gas_note(problem)], gas_rows(problem)
+    unit, power_unit = readable("N m")[0], readable("W", "kW")[0]
     for name, peak, angle, imep, torque, power, density, brake in rows[:_LINES]:
-        line = f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, gas torque {torque} N m, "
-        friction = f"; brake torque {brake} N m" if brake != torque else ""
-        lines.append(f"{line}power {power} kW, {density} kW/l{friction}")
+        line = f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, gas torque {torque} {unit}, "
+        friction = f"; brake torque {brake} {unit}" if brake != torque else ""
+        lines.append(f"{line}power {power} {power_unit}, {density} {power_unit}/l{friction}")
     further = len(rows) - _LINES
     return [*lines, f"gas: the report has {counted(further, 'further operating point')}"] if further > 0 else lines
 
@@ -98,9 +106,11 @@ def _facts(problem: Problem) -> list[tuple[str, GasFacts]]:
 
 
 def _figures(facts: GasFacts) -> list[str]:
-    kilowatts, litres = 1e-3 * facts.power, 1e3 * facts.displacement
+    turning, power = readable("N m")[1], readable("W", "kW")[1] * facts.power
     # friction that takes all torque leaves rounding
     brake = facts.torque - facts.friction if abs(facts.torque - facts.friction) > 1e-9 * abs(facts.torque) else 0.0
-    bars = 1e-5 * facts.peak_pressure, 1e-5 * facts.imep
-    numbers = bars[0], DEGREE * facts.peak_angle, bars[1], facts.torque, kilowatts, kilowatts / litres, brake
+    numbers = (
+        1e-5 * facts.peak_pressure, DEGREE * facts.peak_angle, 1e-5 * facts.imep, turning * facts.torque, power,
+        power / (1e3 * facts.displacement), turning * brake,
+    )  # fmt: skip
     return [trimmed(number) for number in numbers]

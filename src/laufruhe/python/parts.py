@@ -18,7 +18,7 @@ class EngineParts(Parts):
 
     def units(
         self, *, force: str | None = None, mass: str | None = None, unbalance: str | None = None,
-        length: str | None = None,
+        length: str | None = None, torque: str | None = None, inertia: str | None = None, power: str | None = None,
     ) -> Self:
         """Return the engine with units.
 

@@ -12,7 +12,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_forces import CycleMeasures
 from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, turning_inertia, turning_torque
-from laufruhe.present.gas_figures import HEAD, gas_note, gas_rows
+from laufruhe.present.gas_figures import gas_head, gas_note, gas_rows
 from laufruhe.present.measures import (
     Places,
     evaluations_with_loads,
@@ -115,8 +115,8 @@ def _orders(
     pairs = zip(*(amplitudes(design.loads[k]) for design in designs), strict=True)
     series = [column for pair in pairs for column in pair]
     length = max(len(column) for column in series)
-    unit, factor = readable("N")
-    factors = np.repeat([factor if "force" in name else 1.0 for name in names], len(designs))
+    units_of_names = [readable("N" if "force" in name else "N m") for name in names]
+    factors = np.repeat([factor for _, factor in units_of_names], len(designs))
     table = factors * np.stack([pad_orders(column, length) for column in series], axis=1)
     # a quantity has one scale, before and after
     scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
@@ -130,7 +130,7 @@ def _orders(
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
     selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
     note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
-    units = ", ".join(dict.fromkeys(unit if "force" in name else "N m" for name in names))
+    units = ", ".join(dict.fromkeys(unit for unit, _ in units_of_names))
     return Table(head, rows, title=f"{title} at {result.problem.points[k].name} [{units}]", note=note)
 
 
@@ -146,7 +146,7 @@ def _amplitudes(loads: PointLoads) -> list[Array]:
 def gas(result: Result) -> list[Table]:
     """Return a row of key figures per operating point with gas."""
     rows, note = gas_rows(result.problem), " ".join(gas_note(result.problem))
-    return [Table(HEAD, rows, title="Gas pressure", note=note, file="gas-pressure")]
+    return [Table(gas_head(), rows, title="Gas pressure", note=note, file="gas-pressure")]
 
 
 def torque(result: Result) -> list[Table]:
@@ -154,13 +154,14 @@ def torque(result: Result) -> list[Table]:
     engine, problem = result.final.engine, result.problem
     if not uses_torque(result):
         return []
-    rows = []
+    rows, (unit, factor), (power_unit, _) = [], readable("N m"), readable("W", "kW")
     for point in problem.points:
         cells = _torque_cells(torque_facts(engine, point, problem.fidelity))
         turning = turning_torque(engine, point, problem.fidelity)
-        rows.append((point.name, *cells, DASH if turning is None else number(turning.torque)))
+        rows.append((point.name, *cells, DASH if turning is None else number(factor * turning.torque)))
     head = (
-        "at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity", "to turn [N m]"
+        "at", f"mean [{unit}]", f"power [{power_unit}]", f"least [{unit}]", f"largest [{unit}]", "stored [J]",
+        "irregularity", f"to turn [{unit}]",
     )  # fmt: skip
     return [
         Table(head, rows, title="Torque of the crankshaft", note=TORQUE, file="crankshaft-torque"),
@@ -189,7 +190,9 @@ def _range_text(low: float, high: float) -> str:
 
 
 def _torque_cells(facts: TorqueFacts) -> list[str]:
-    size, uneven = max(abs(facts.minimum), abs(facts.largest)), facts.irregularity
-    numbers = [number(value, scale=size) for value in (facts.mean, 1e-3 * facts.power, facts.minimum, facts.largest)]
+    factor, of_power = readable("N m")[1], readable("W", "kW")[1]
+    size, uneven = factor * max(abs(facts.minimum), abs(facts.largest)), facts.irregularity
+    values = factor * facts.mean, of_power * facts.power, factor * facts.minimum, factor * facts.largest
+    numbers = [number(value, scale=size) for value in values]
     even = DASH if uneven is None else "0" if not uneven else f"{number(uneven, 3)} (1/{1.0 / uneven:.4g})"
     return [*numbers, number(facts.excursion), even]
