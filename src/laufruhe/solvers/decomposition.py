@@ -7,7 +7,7 @@ a problem out; another objective of that order decides it, and adds nothing to t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -53,7 +53,7 @@ def _terms_of(group: Kinds, terms: Iterable[Term], problem: Problem) -> tuple[Te
     return tuple(term for term in terms if group in (_groups_of(term.measure, problem) or last))
 
 
-def refuse_unused(problem: Problem, ranks: Iterable[PriorityLevel]) -> None:
+def refuse_unused(problem: Problem, ranks: Sequence[PriorityLevel]) -> None:
     """Raise an error for a group of decisions on which no objective depends.
 
     Raises
@@ -70,11 +70,12 @@ def refuse_unused(problem: Problem, ranks: Iterable[PriorityLevel]) -> None:
             )
 
 
-def solve_decomposed(problem: Problem, solve: Solve, ranks: Iterable[PriorityLevel] = ()) -> Result:
+def solve_decomposed(problem: Problem, solve: Solve, ranks: Sequence[PriorityLevel] = ()) -> Result:
     """Solve each group of decisions by its own method, and return one joint result.
 
     A group that the objective leaves out is decided by the first of `ranks` that depends on it.
     """
+    refuse_unused(problem, ranks)
     groups = _groups(problem)
     objectives = [problem.objective, *(rank.terms for rank in ranks)]
     parts = {

@@ -299,7 +299,7 @@ def _refuse(problem: Problem, ranks: Sequence[PriorityLevel]) -> None:
         raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")
     if problem.phasing is not None and _method(problem).solver is _SOLVE_STARS:
         refuse_long(problem)
-    if _method(problem).solver is solve_separable:
+    if _method(problem).solver is solve_separable and not _has_constant_objective(problem):
         refuse_unused(problem, ranks)
 
 
