@@ -15,6 +15,7 @@ from lanes import first_fast
 from laufruhe.errors import BoundError, InputError, LaufruheError, SolverError
 from laufruhe.extensions.parts_lists import solver
 from laufruhe.extensions.parts_lists.lists import RANKED, Outcome
+from laufruhe.extensions.parts_lists.price import price_of
 from laufruhe.extensions.parts_lists.section import SECTION
 from laufruhe.files.reader import load, load_tables
 from laufruhe.numerics.witness import collected
@@ -122,6 +123,25 @@ def test_price_is_a_limit_or_a_term(read: Callable[..., Problem]) -> None:
         assert both.objective.value == pytest.approx(expected, rel=1e-9)
         assert both.certificate is not None
         assert both.certificate.kind is Proof.GLOBAL
+
+
+def test_a_row_over_the_price_limit_is_not_solved(read: Callable[..., Problem]) -> None:
+    """The limit of the file, and one that the rows set: three rows at 9, 6 and 4 under 7, 5 and 4."""
+    limit = '[parts_price]\ntotal = 5\n[[constraints]]\nname = "cost"\nlimit = "parts price"\nmax = 7\n'
+    of_rows = "name, mass [kg], price, most\nsmall, 0.5, 9, 7\nmiddle, 1.5, 6, 5\nlarge, 3.0, 4, 4\n"
+    sets = CHOICE + 'sets = { most = "constraints.cost.max" }\n'
+    for rows, choice, allowed in ((ROWS, CHOICE, {6.0, 4.0}), (of_rows, sets, {4.0})):
+        problem, prices = read(limit, rows=rows, choice=choice), set[float]()
+
+        def decide(part: Problem, prices: set[float] = prices) -> Result:
+            prices.add(price_of(part.engine))
+            return methods._solve_reduced(part)
+
+        result = solver.solve_choices(problem, decide)
+        assert prices == allowed
+        assert result.certificate is not None
+        assert result.certificate.kind is Proof.GLOBAL
+        assert result["cost"] in allowed
 
 
 def test_a_solver_that_stops_proves_nothing(read: Callable[..., Problem]) -> None:

@@ -246,13 +246,17 @@ class _Search(BranchAndBound[Subset]):
         return bound
 
     def _decided(self, problem: Problem) -> tuple[Result, float]:
-        # result without terms of the price, which nothing open changes, and their sum
+        # result without terms of the price, which nothing open changes, and their sum; a price over its limit decides
+        limits = [limit for limit in problem.limits if limit.measure.channel is PARTS_PRICE]
+        cost = price_of(problem.engine)
+        dear = tuple(limit.name for limit in limits if limit.slack(cost)[0] < -FEASIBILITY_TOL)
+        if dear:
+            return infeasible_result(problem, evaluate_start(problem), dear, {}), 0.0
         terms = [term for term in problem.objective if term.measure.channel is PARTS_PRICE]
         others = tuple(term for term in problem.objective if term not in terms)
         if not terms or not others:
             return self.decide(problem), 0.0
-        price = sum(term.weight for term in terms) * price_of(problem.engine)
-        return self.decide(replace(problem, objective=others)), price
+        return self.decide(replace(problem, objective=others)), sum(term.weight for term in terms) * cost
 
     def _relaxed(self, subset: Subset) -> Problem | None:
         """Return the problem of a subset, with limits wider by the violation that designs may have.
