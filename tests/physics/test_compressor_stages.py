@@ -45,7 +45,7 @@ def test_stages_far_too_small_have_no_pressure_that_matches() -> None:
 
 def test_the_note_of_a_problem_names_a_mismatch_until_it_is_removed(tmp_path: Path) -> None:
     """The note gives the pressure that removes its own sentence."""
-    text = (PROBLEMS / "compressor-two-stage.toml").read_text()
+    text = (PROBLEMS / "compressor-two-stage.toml").read_text().replace("3.06 bar", "3.2 bar")
     (sentence,) = [line for line in gas_note(loaded(tmp_path, text)) if "delivers" in line]
     pressure = sentence.split("; at ")[1].split(" bar")[0]
     assert not [

@@ -334,10 +334,10 @@ def test_half_orders_belong_to_four_stroke_engines() -> None:
 @pytest.mark.parametrize(
     ("text", "mean", "words"),
     [
-        # the compressor takes 35.7 N m, the four-cylinder gives 101 N m
-        ("compressor", "80 N m", "drives the crank, and gas and friction take 35.69 N m; the difference of 44.31 N m"),
-        ("compressor", "20 N m", "the difference of 15.69 N m would change the speed; give a sum of 35.69 N m"),
-        ("compressor", "35.7 N m", ""),
+        # the compressor takes 34.9 N m, the four-cylinder gives 101 N m
+        ("compressor", "80 N m", "drives the crank, and gas and friction take 34.86 N m; the difference of 45.14 N m"),
+        ("compressor", "20 N m", "the difference of 14.86 N m would change the speed; give a sum of 34.86 N m"),
+        ("compressor", "34.9 N m", ""),
         ("engine", "-300 N m", "brakes the crank, and gas and friction give"),
         ("engine", "-20 N m", ""),
         ("engine", "20 N m", ""),
