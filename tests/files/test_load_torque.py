@@ -91,6 +91,18 @@ def test_a_file_that_is_no_torque_is_refused_in_one_line(
     assert "pressure" not in str(told.value).replace("'pressure [bar]'", "")
 
 
+@pytest.mark.parametrize("turned", [45.0, 300.0])
+def test_the_coupling_counts_from_the_dead_centre_of_cylinder_1(turned: float) -> None:
+    """Throws that are turned alike turn where phi is zero, and nothing else."""
+    engine = {key: value for key, value in SET["engine"].items() if key != "firing_order"}
+    problems = [
+        load_tables({**SET, "engine": engine | {"throws": throws}}, PROBLEMS / "compressor-set.toml")
+        for throws in ([0, 0], [turned, turned])
+    ]
+    excursions = [torque_facts(problem.engine, problem.points[0]).excursion for problem in problems]
+    assert excursions[1] == pytest.approx(excursions[0], rel=1e-6)
+
+
 def test_the_angle_of_the_coupling_may_be_open(tmp_path: Path) -> None:
     """The best angle needs a smaller flywheel than angles 45 degrees from it."""
     engine_of = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,7 @@ import numpy as np
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import errors_at_key
 from laufruhe.files.recorded_trace import Column, OverAngleTable, Quantity, RecordedFile, smooth_values
-from laufruhe.machine import Cycle, LoadTorque
+from laufruhe.machine import Cycle, LoadTorque, SliderCrank
 
 TORQUE = Quantity("torque", "N m", "N m", 1.0, "torque of the load")
 
@@ -29,7 +30,9 @@ class LoadTorqueTable(OverAngleTable):
     )
 
 
-def load_torque_of(table: LoadTorqueTable | None, folder: Path, cycle: Cycle) -> LoadTorque | None:
+def load_torque_of(
+    table: LoadTorqueTable | None, folder: Path, cycle: Cycle, cylinders: Sequence[SliderCrank]
+) -> LoadTorque | None:
     """Return the torque of the driven machine; None without [load_torque]."""
     if table is None:
         return None
@@ -44,5 +47,7 @@ def load_torque_of(table: LoadTorqueTable | None, folder: Path, cycle: Cycle) ->
     repeated = f", {periods} times in each cycle" if periods > 1 else ""
     file.said.append(f"{text}{repeated}; its mean is replaced by the mean torque of the engine.")
     with errors_at_key(f"{where}.file", table.file):
-        at = tuple((angles + table.angle_zero).tolist())
+        # with throws of the file, cylinder 1 does not fire at crank angle zero (C5)
+        fires = cylinders[0].firing_angle if cylinders else 0.0
+        at = tuple((angles + table.angle_zero + fires).tolist())
         return LoadTorque(at, tuple(mean.tolist()), periods, tuple(file.said))

@@ -338,7 +338,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     engine = Engine(
         file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, bearings, wheel,
         geared, load_cases_of(file.load_cases, on_mounts.block),
-        load_torque=load_torque_of(file.load_torque, path.parent, cycle), gravity=table.gravity,
+        load_torque=load_torque_of(file.load_torque, path.parent, cycle, cylinders), gravity=table.gravity,
     )  # fmt: skip
     load_said = [f"Load: {sentence}" for sentence in engine.load_torque.recording] if engine.load_torque else []
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)

@@ -18,6 +18,9 @@ from typer.testing import CliRunner, Result
 import laufruhe
 from laufruhe.cli import app
 from laufruhe.extensions.exchange.command import Target
+from laufruhe.extensions.exchange.components import export_loads
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.solvers import evaluate_only
 from problem_files import PROBLEMS
 
 ELASTIC, RIGID, TWISTED = "powertrain-hydraulic", "tractor-two", "inline-five-generator"
@@ -117,6 +120,14 @@ def test_tables_have_amplitude_and_phase(to: str, exported: Callable[[str], Path
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("throw", "angle"), [(0, 45), (45, 0), (225, -180)])
+def test_the_head_says_where_cylinder_1_has_its_dead_centre(throw: int, angle: int) -> None:
+    tables = tables_of(PROBLEMS / "compressor-two-stage.toml")
+    problem = load_tables({**tables, "engine": {**tables["engine"], "throws": [throw]}}, PROBLEMS / "set.toml")
+    loads = export_loads(evaluate_only(problem), {}, 10.0, millimetres=False)
+    assert loads.heading()[-1] == f"phi = {angle} deg: firing dead centre of cylinder 1"
+
+
 def test_netcdf_has_the_attributes_of_cf(exported: Callable[[str], Path], elastic: laufruhe.Result) -> None:
     with xr.open_dataset(exported("netcdf"), engine="scipy") as data:
         assert data.attrs["Conventions"] == "CF-1.11"

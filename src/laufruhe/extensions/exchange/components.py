@@ -26,7 +26,7 @@ CONVENTION = (
     "block: force and moment of gas and moving masses on the block, at the origin",
     "origin: on the crank axis, midway between first and last cylinder",
     "load at crank angle phi: sum over orders of amplitude cos(order phi + phase)",
-    "phi = 0: firing dead centre of cylinder 1; peak amplitudes; exp(+i w t)",
+    "peak amplitudes; exp(+i w t)",
 )
 """Directions, senses and phases in words (C2, C7, C8)."""
 _FIELDS = {
@@ -68,9 +68,16 @@ class Component:
 
 @dataclass(frozen=True, eq=False)
 class ExportLoads:
-    """Components of the loads of one design, and their orders from zero in steps of the base order."""
+    """Components of the loads of one design, and their orders from zero in steps of the base order.
+
+    Attributes
+    ----------
+    zero
+        Crank angle zero in words.
+    """
 
     title: str
+    zero: str
     points: tuple[OperatingPoint, ...]
     cycle: float
     orders: Array
@@ -80,9 +87,14 @@ class ExportLoads:
         """Return the frequency of every order at operating point k [Hz]."""
         return np.asarray(self.orders * self.points[k].speed / math.tau)
 
+    @property
+    def convention(self) -> tuple[str, ...]:
+        """Directions, senses and phases in words, with the crank angle from which they count."""
+        return (*CONVENTION, self.zero)
+
     def heading(self) -> list[str]:
         """Return the first lines of a text file: maker, title and convention."""
-        return [f"{MADE_BY} from: {printed(self.title)}", *CONVENTION]
+        return [f"{MADE_BY} from: {printed(self.title)}", *self.convention]
 
 
 def plain(text: str) -> str:
@@ -115,7 +127,24 @@ def export_loads(result: Result, nodes: Mapping[str, int], highest: float, milli
                 Component(place, nodes.get(place, 0), quantity, unit, direction, factor * values, factor * coefficients)
             )
     problem = result.problem
-    return ExportLoads(problem.title, problem.points, problem.engine.cycle.angle, orders[:count], tuple(components))
+    return ExportLoads(
+        problem.title,
+        _zero(result.final.engine),
+        problem.points,
+        problem.engine.cycle.angle,
+        orders[:count],
+        tuple(components),
+    )
+
+
+def _zero(engine: Engine) -> str:
+    # with throws of the file, cylinder 1 has its dead centre elsewhere (C5)
+    cylinders = engine.cylinders or engine.slider_cranks
+    if not cylinders:
+        return "phi = 0: unbalances at their angles"
+    thing = "firing dead centre" if engine.cylinders else "dead centre"
+    angle = math.remainder(cylinders[0].firing_angle, engine.cycle.angle)
+    return f"phi = {math.degrees(angle) + 0.0:.6g} deg: {thing} of {plain(cylinders[0].name)}"
 
 
 def node_numbers(engine: Engine, text: str) -> dict[str, int]:

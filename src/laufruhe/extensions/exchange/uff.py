@@ -34,7 +34,7 @@ def universal_file(loads: ExportLoads, mounts: Sequence[Mount]) -> str:
         hertz = float(loads.frequencies(k)[min(1, len(loads.orders) - 1)])
         for c in (c for c in loads.components if c.node):
             heads = (f"{c.quantity} {c.axis} at {c.place}", loads.title, MADE_BY, speed_text(point),
-                     "peak amplitudes, exp(+i w t), time 0: firing dead centre of cylinder 1")  # fmt: skip
+                     f"peak amplitudes, exp(+i w t), {loads.zero}")  # fmt: skip
             texts, speed = [plain(head)[:80] for head in heads], point.speed * RPM
             time = _function(c, _TIME_RESPONSE, speed, (17, "time", "s"), step / c.values.shape[1], c.values[k])
             spectrum = _function(c, _SPECTRUM, speed, (18, "frequency", "Hz"), hertz, c.series[k])

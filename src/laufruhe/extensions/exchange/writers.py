@@ -11,7 +11,6 @@ from laufruhe.errors import ModelError, counted, refused
 from laufruhe.extensions.exchange import scripts
 from laufruhe.extensions.exchange.components import (
     BLOCK,
-    CONVENTION,
     MADE_BY,
     ExportLoads,
     export_loads,
@@ -69,7 +68,7 @@ def write(result: Result, target: str, nodes: Mapping[str, int], highest: float,
         write_csv(Table(_HEAD, list(rows(loads))), path, loads.heading())
     elif target == "json":
         content = [dict(zip(_HEAD, row, strict=True)) for row in rows(loads)]
-        files.write(path, strict({"title": loads.title, "convention": CONVENTION, "loads": content}))
+        files.write(path, strict({"title": loads.title, "convention": loads.convention, "loads": content}))
     elif target == "netcdf":
         _write_netcdf(loads, result, path)
     else:
@@ -98,6 +97,6 @@ def _write_netcdf(loads: ExportLoads, result: Result, path: Path) -> None:
     data = data.assign_coords(time=time.assign_attrs(units="s", long_name="time from crank angle zero"))
     data.angle.attrs["units"] = "degree"
     data.attrs = {
-        "source": MADE_BY + " ", "Conventions": "CF-1.11", "title": loads.title, "comment": "; ".join(CONVENTION)
+        "source": MADE_BY + " ", "Conventions": "CF-1.11", "title": loads.title, "comment": "; ".join(loads.convention)
     }  # fmt: skip
     data.to_netcdf(path, engine="scipy")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from laufruhe.extensions.workshop.crankcase import is_checked
+from laufruhe.extensions.workshop.crankcase import Crankcase, is_checked
 from laufruhe.extensions.workshop.part import Weight, Workshop, clearances_of, weights_of
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
 from laufruhe.present.pictures import ResultPicture
@@ -20,8 +20,8 @@ _SIZES = ("inner_radius", "outer_radius", "angle", "width", "tail", "fillet")
 _SIZE_NOTE = "Open sizes are those of the least mass with this unbalance."
 _MASS_NOTE = "Mass, unbalance and inertia are those of all bodies of a weight; the inertia is about its shaft."
 _CLEARANCE_NOTE = (
-    "Least distance over a working cycle, and the crank angle at which it occurs. Weights, pistons, rods, walls and "
-    "round parts are checked; webs, bearings and block are not."
+    "Least distance over a working cycle, and the crank angle at which it occurs. Webs, bearings and block are not "
+    "checked{}."
 )
 
 
@@ -71,7 +71,6 @@ def _clearances(result: Result) -> Table:
     engine = result.final.engine
     workshop, rows = engine.extra(Workshop), []
     length, millimetres = readable("m")
-    wanted = workshop.crankcase.clearance if workshop else 0.0
     for weight, distances in clearances_of(engine, weights_of(engine)):
         for clearance in distances:
             angle = clearance.minimum.angle
@@ -79,9 +78,14 @@ def _clearances(result: Result) -> Table:
             distance = clearance.minimum.distance
             size = "collides" if distance < 0.0 else number(millimetres * distance)
             rows.append((weight.rotor.name, clearance.part, size, at))
+    case = workshop.crankcase if workshop else Crankcase()
+    unknown = [f"{thing} without {key}" for thing, key, size in
+               (("pistons", "skirt", case.skirt), ("rods", "rod", case.rod)) if size is None]  # fmt: skip
+    lacking = f", nor {' and '.join(unknown)} of [crankcase]" if unknown else ""
     omitted = [part.name for part in engine.slider_cranks if not is_checked(part)]
     more = f" Not checked, because they are no plain slider-cranks: {', '.join(omitted)}." if omitted else ""
-    note = f"{_CLEARANCE_NOTE} The file demands {trimmed(millimetres * wanted)} {length}.{more}"
+    demand = f"The file demands {trimmed(millimetres * case.clearance)} {length}."
+    note = f"{_CLEARANCE_NOTE.format(lacking)} {demand}{more}"
     head = ("weight", "part", f"clearance [{length}]", "at crank angle [deg]")
     return Table(head, rows, title="Clearances of the bodies", left=2, note=note, file="clearances")
 
