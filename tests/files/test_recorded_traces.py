@@ -583,6 +583,21 @@ def test_statistics_of_a_test_bench_are_no_cycles(tmp_path: Path) -> None:
         assert f"Columns that are not used: '{names[1]}" in " ".join(recording)
 
 
+def test_common_angles_have_one_zero(tmp_path: Path) -> None:
+    """A wrong order of firing moves a cylinder by a turn, which is no other dead centre."""
+    four = [np.interp(DEGREES - late, DEGREES, P, period=720.0) for late in (0.0, 540.0, 180.0, 360.0)]
+    in_columns(tmp_path, {f"PCYL{k}": values for k, values in enumerate(four, 1)})
+    gas = 'cylinder_columns = [2, 3, 4, 5]\ncylinder_angles = "common"'
+    assert problem_with(tmp_path, "columns.csv", gas, engine=FOUR).points
+    with pytest.raises(InputError, match="puts the peak of cylinder 2"):
+        problem_with(tmp_path, "columns.csv", gas, engine=FOUR.replace("[1, 3, 4, 2]", "[1, 2, 4, 3]"))
+
+
+def test_a_motored_column_is_no_cycle(tmp_path: Path) -> None:
+    in_columns(tmp_path, {"fired": P, "motored": 1.0 + 0.6 * (P - 1.0)})
+    assert facts_of(problem_with(tmp_path, "columns.csv"))[0].peak_pressure == pytest.approx(1e5 * P.max(), rel=1e-4)
+
+
 def test_columns_of_cylinders_are_no_cycles(tmp_path: Path) -> None:
     for names in (("Zyl. 1", "Zyl. 2"), ("p1", "p2"), ("PCYL1", "PCYL2")):
         in_columns(tmp_path, dict.fromkeys(names, P))

@@ -280,13 +280,19 @@ def _traces(
         rule = f"has {counted(len(columns), 'column')} for {counted(len(fired), 'cylinder')} that fire"
         raise Refused("gas.cylinder_columns", None, rule, "name one column for each cylinder, by its number")
     traces, period = dict[str, CommonGas](), chamber_cycle.angle / pace
+    if zero is None and table.cylinder_angles == "common" and chamber_cycle is Cycle.FOUR_STROKE:
+        # one zero for all columns, so that none hides a wrong order of firing
+        leading = table.model_copy(update={"pressure_column": [columns[0]]})
+        starts = ("firing", "gas exchange")
+        zero = next((start for start in starts if _is_near_firing(read(leading, zero=start), period)), None)
+        read = partial(read, zero=zero)
     first: PressureTrace | None = None
     for k, column in zip(fired, columns, strict=True):
         one = table.model_copy(update={"pressure_column": [column]})
         later = parts[k].firing_angle - parts[fired[0]].firing_angle if table.cylinder_angles == "common" else 0.0
         trace = replace(read(one, later=later), motored=motored)
-        peak = math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)
-        if abs(peak) > NEAR_FIRING:
+        if not _is_near_firing(trace, period):
+            peak = math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)
             other = "own" if table.cylinder_angles == "common" else "common"
             rule = f"puts the peak of {parts[k].name} {math.degrees(peak):.4g} deg after its firing"
             remedy = f'check columns and firing_order, or write cylinder_angles = "{other}"'
@@ -295,6 +301,10 @@ def _traces(
         traces |= dict.fromkeys(names_of_cylinders([k + 1], parts, "gas.cylinder_columns"), trace)
     assert first is not None
     return first, traces
+
+
+def _is_near_firing(trace: PressureTrace, period: float) -> bool:
+    return abs(math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)) <= NEAR_FIRING
 
 
 def _angle_zero(table: TraceTable, cycle: Cycle) -> str | float | None:

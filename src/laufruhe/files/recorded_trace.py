@@ -23,12 +23,12 @@ from laufruhe.physics.pressure_trace import bottom_pressure, peak_angle, smooth_
 from laufruhe.units import quantity_text
 
 _ANGLE_NAME = re.compile(r"angle|winkel|^(?:ca|kw|cad|theta|phi|alpha|gamma)\b", re.IGNORECASE)
-_STATISTIC_NAME = re.compile(
+_OTHER_NAME = re.compile(
     r"(?:^|[\W_])(?:min(?:imum)?|max(?:imum)?|median|std(?:dev)?|stdev|stabw|standardabw\w*|standard deviation|sigma|"
-    r"cov)(?:[\W_]|$)",
+    r"cov|motored|drag|geschleppt)(?:[\W_]|$)",
     re.IGNORECASE,
 )
-"""Heading of a column that a test bench computes from several cycles, and that is no pressure over a cycle."""
+"""Heading of a column that is no cycle with combustion: computed from several cycles, or motored."""
 _CYLINDER_NAME = re.compile(r"^(?:p|p?[ _]?(?:cyl|zyl)[a-z]*[ ._-]*)\d+\s*(?:[\[(/].*)?$", re.IGNORECASE)
 _GAUGE_NAME = re.compile(r"gauge|überdruck|ueberdruck", re.IGNORECASE)
 _ALIKE = 0.9
@@ -227,7 +227,7 @@ class RecordedFile:
         others = [k for k in range(len(units)) if k != self.angle_column]
         columns = [k for k in others if (unit := units[k]) and unit.dimension == self.records.si]
         columns = columns or [k for k in others if units[k] is None]
-        columns = [k for k in columns if not _STATISTIC_NAME.search(self.numbers.names[k])] or columns
+        columns = [k for k in columns if not _OTHER_NAME.search(self.numbers.names[k])] or columns
         if not columns:
             rule = f"has no {self.records.name}s: {self.name(others[0])} has another unit"
             raise self.refused(rule, f"convert it to a {self.records.name}, which needs the gain of the sensor")
