@@ -6,8 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from scipy.optimize import brentq
-
 from laufruhe.machine.chambers import suction_point
 
 MAX_SWEEPS, CLOSE = 200, 1e-10
@@ -74,6 +72,9 @@ def matched_pressures(stages: Sequence[Stage]) -> list[float] | None:
 
     A sweep solves one link after the other. A link delivers less and takes in more the higher its pressure is.
     """
+    # imported late, as it takes longer than a check
+    from scipy.optimize import brentq
+
     links = links_of(stages)
     for _ in range(MAX_SWEEPS):
         change = 0.0
