@@ -254,8 +254,10 @@ def _layout(key: str, text: str, _: Answers) -> Answers:
     The angle of a vee is that of its banks, and that of other layouts is the first firing interval.
     """
     layouts, counts, angles = list[str](), list[int](), list[int]()
-    plain = re.sub("-?(zylinder|cyl\\w*)", " ", re.sub("reihen-?", "inline ", text.lower()))
-    for word, degrees in re.findall(r"(\d+|[^\W\d_]+)\s*(°|deg\b|grad\b)?", plain):
+    # an L twin is a vee of 90 degrees, and an L4 is in line
+    plain = re.sub("-?(zylinder|cyl\\w*)|(?<=sechs)er|(?<=vier)er|(?<=acht)er", " ", text.lower())
+    plain = re.sub("reihen-?", "inline ", re.sub(r"\bl[ -]?twin", "90° vee twin", plain))
+    for word, degrees in re.findall(r"(\d+|[^\W\d_]+)[\s-]*(°|deg(?:rees?)?\b|grad\b)?", plain):
         layout, count = trade_value("layout", word), trade_value("cylinders", word)
         if word.isdigit():
             (angles if degrees or int(word) > _MOST_CYLINDERS else counts).append(int(word))

@@ -73,7 +73,6 @@ def matched_pressures(stages: Sequence[Stage]) -> list[float] | None:
     A sweep solves one link after the other. A link delivers less and takes in more the higher its pressure is.
     """
     # imported late, as it takes longer than a check
-    from scipy.optimize import brentq
 
     links = links_of(stages)
     for _ in range(MAX_SWEEPS):
@@ -97,6 +96,9 @@ def matched_pressures(stages: Sequence[Stage]) -> list[float] | None:
 
 
 def _matched(link: Link) -> float | None:
+    # imported late, as it takes longer than a check
+    from scipy.optimize import brentq
+
     lower, upper = max(stage.suction for stage in link.before), min(stage.delivery for stage in link.after)
 
     def difference(pressure: float) -> float:
