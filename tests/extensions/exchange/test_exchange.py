@@ -120,7 +120,7 @@ def test_tables_have_amplitude_and_phase(to: str, exported: Callable[[str], Path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("throw", "angle"), [(0, 45), (45, 0), (225, -180)])
+@pytest.mark.parametrize(("throw", "angle"), [(0, 45), (45, 0), (135, -90)])
 def test_the_head_says_where_cylinder_1_has_its_dead_centre(throw: int, angle: int) -> None:
     tables = tables_of(PROBLEMS / "compressor-two-stage.toml")
     problem = load_tables({**tables, "engine": {**tables["engine"], "throws": [throw]}}, PROBLEMS / "set.toml")
