@@ -49,6 +49,7 @@ from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.toml_text import line_deeper_than, toml_complaint, toml_text
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
+from laufruhe.machine.slider_crank import displacement
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Origin, Problem, Search
 from laufruhe.problem.problem import Path as Place
@@ -394,7 +395,7 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
     ):
         rule = "shares a load at the brake equally, and [[gas.single_cylinders]] have an imep of their own"
         raise Refused("friction", None, rule, "give the operating points an imep, or remove that of the cylinders")
-    return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
+    return Brake(file.friction, folder, displacement(cylinders), cycle)
 
 
 def _check_decisions(problem: Problem) -> None:

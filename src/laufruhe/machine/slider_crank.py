@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar
@@ -279,6 +279,11 @@ class OffsetCrank(SliderCrank):
     def fires_at(self) -> float:
         """Local crank angle of the highest piston position [rad] (G2)."""
         return self.dead_centres[0]
+
+
+def displacement(parts: Iterable[SliderCrank]) -> float:
+    """Return the swept volume of several cylinders [m3]."""
+    return sum(part.piston_area * part.stroke for part in parts)
 
 
 def as_kind(kind: type[P], part: SliderCrank, **numbers: Any) -> P:

@@ -11,6 +11,7 @@ import numpy as np
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.machine.chambers import cylinder_gas
+from laufruhe.machine.slider_crank import displacement
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.exact_angles import Turn, as_turn, star_orders
 from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
@@ -28,8 +29,7 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT, fmep: f
     loads = _gas_loads(engine.cycle, engine.slider_cranks, gas, fidelity)
     if fmep == 0.0:
         return loads
-    displacement = sum(part.piston_area * part.stroke for part in engine.slider_cranks)
-    friction = mean_torque(fmep, displacement, engine.cycle.turns)
+    friction = mean_torque(fmep, displacement(engine.slider_cranks), engine.cycle.turns)
     return loads + Spectrum(engine.cycle.base_order, np.array([-friction * ROLL], dtype=complex))
 
 

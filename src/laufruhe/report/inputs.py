@@ -14,6 +14,7 @@ from laufruhe.files.numbering import USUAL
 from laufruhe.machine import Engine, Mount, Rotor, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.machine.mount import every_spring
+from laufruhe.machine.slider_crank import displacement
 from laufruhe.physics.rigid_body import turns_of
 from laufruhe.present.numbers import DASH, DEGREE, fixed, trimmed, with_unit
 from laufruhe.present.tables import Table
@@ -59,7 +60,7 @@ def _engine_rows(problem: Problem, engine: Engine) -> Iterator[tuple[str, str]]:
         intervals = ", ".join(trimmed(DEGREE * angle) for angle in engine.firing_intervals)
         yield "firing order", f"{order}, after {intervals} deg"
     if all(part.bore is not None for part in fired):
-        yield "displacement", f"{trimmed(1e3 * sum(part.piston_area * part.stroke for part in engine.slider_cranks))} l"
+        yield "displacement", f"{trimmed(1e3 * displacement(engine.slider_cranks))} l"
     if "gas" in tables:
         yield (
             "gas",

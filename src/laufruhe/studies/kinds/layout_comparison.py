@@ -14,6 +14,7 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
+from laufruhe.machine.slider_crank import displacement
 from laufruhe.physics.torque import swing_of, torque_facts
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import number as figures
@@ -197,7 +198,7 @@ def _sizes(problem: Problem) -> dict[str, tuple[str, Further]]:
     sizes: dict[str, tuple[str, Further]] = {
         "bore": ("m", lambda design: math.sqrt(4.0 * design.engine.slider_cranks[0].piston_area / math.pi)),
         "stroke": ("m", lambda design: design.engine.slider_cranks[0].stroke),
-        "displacement": ("m^3", lambda design: sum(p.piston_area * p.stroke for p in design.engine.slider_cranks)),
+        "displacement": ("m^3", lambda design: displacement(design.engine.slider_cranks)),
     }
     for k, point in enumerate(problem.points):
         at = f" at {point.name}" if len(problem.points) > 1 else ""
