@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -20,6 +21,7 @@ from laufruhe.files.gas import GasTable, SeiligerTable, WiebeTable
 from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases, models_of
 from laufruhe.machine.gas import AMBIENT_PRESSURE
+from laufruhe.machine.slider_crank import displacement
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
@@ -181,16 +183,12 @@ def operating_points(
         speeds = _speeds(table, stroke, where)
         states = cylinder_states(table, parts, where, table.name is not None)
         base = gas if table.pressure_file is None else read(table.pressure_file, f"{where}.pressure_file")
+        is_recorded = any(isinstance(model, PressureTrace) for model in models_of(base))
+        record = partial(_recorded_friction, table, base, cycle, parts, where) if base and is_recorded else None
         for speed in speeds:
             speed_text = units.quantity_text(speed, "rad/s", 6)
             name = (f"{table.name} {speed_text}" if len(speeds) > 1 else table.name) if table.name else speed_text
-            recorded = base if any(isinstance(model, PressureTrace) for model in models_of(base)) else None
-            has_brake = table.bmep is not None or table.brake_torque is not None
-            loads = (
-                [("", None, _recorded_friction(table, recorded, cycle, parts, where))]
-                if recorded and has_brake and not table.motored
-                else _loads(table, speed, brake, where, name)
-            )
+            loads = _loads(table, speed, brake, where, name, record)
             for suffix, imep, fmep in loads:
                 load = _loaded(base, table.model_copy(update={"imep": imep}), cycle, where)
                 share = table.weight / len(speeds) / len(loads) / len(states)
@@ -240,11 +238,13 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
 
 
 def _loads(
-    table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str
+    table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str,
+    record: Callable[[str], float] | None,
 ) -> list[tuple[str, float | None, float]]:  # fmt: skip
     """Return the loads of an operating point: name suffix, indicated mean pressure and that of friction [Pa].
 
-    A load at the brake with an uncertain friction gives three: least, mean and most load.
+    A load at the brake with an uncertain friction gives three: least, mean and most load. Beside a recorded pressure it
+    gives the friction, which `record` returns by the key of the load.
     """
     keys = [key for key in ("imep", "bmep", "brake_torque") if getattr(table, key) is not None]
     if len(keys) > 1 or (table.motored and keys[1:]):
@@ -252,6 +252,8 @@ def _loads(
     if table.bmep is None and table.brake_torque is None:
         fmep = brake.friction(speed, name).mean if brake is not None and table.gas else 0.0
         return [("", table.imep, fmep)]
+    if record is not None and table.gas and not table.motored:
+        return [("", None, record(keys[0]))]
     if brake is None:
         remedy = "add [friction], which gives the loss between gas and brake"
         raise Refused(f"{where}.{keys[0]}", None, "needs [friction]", remedy)
@@ -268,21 +270,17 @@ def _loads(
 
 
 def _recorded_friction(
-    table: OperatingPointTable, gas: GasModel, cycle: Cycle, parts: Sequence[SliderCrank], where: str
+    table: OperatingPointTable, gas: GasModel, cycle: Cycle, parts: Sequence[SliderCrank], where: str, key: str
 ) -> float:
     """Return the mean pressure of friction [Pa]: that of the recorded pressure less that at the brake (L5b)."""
-    if table.imep is not None or (table.bmep is not None and table.brake_torque is not None):
-        raise Refused(f"{where}.brake_torque", None, "is given beside another load", "keep one")
-    displacement = sum(part.piston_area * part.stroke for part in parts)
     torque = sum(float(gas_coefficients(gas, part, cycle).coefficients[0].real) for part in parts)
-    imep = mean_pressure(torque, displacement, cycle.turns)
-    key = "bmep" if table.brake_torque is None else "brake_torque"
-    bmep = table.bmep if table.brake_torque is None else mean_pressure(table.brake_torque, displacement, cycle.turns)
-    friction = imep - (bmep or 0.0)
+    volume = displacement(parts)
+    imep, load = mean_pressure(torque, volume, cycle.turns), getattr(table, key)
+    friction = imep - (load if key == "bmep" else mean_pressure(load, volume, cycle.turns))
     if friction < 0.0:
         rule = f"is more than the gas gives, whose recorded imep is {units.quantity_text(1e-5 * imep, 'bar')}"
         raise Refused(f"{where}.{key}", None, rule, "check angle_zero of [gas], and the load")
-    return friction
+    return float(friction)
 
 
 def _loaded_cylinders(gas: CylinderGases, table: OperatingPointTable, cycle: Cycle, where: str) -> CylinderGases:
