@@ -284,15 +284,14 @@ def _traces(
         # one zero for all columns, so that none hides a wrong order of firing
         leading = table.model_copy(update={"pressure_column": [columns[0]]})
         starts = ("firing", "gas exchange")
-        zero = next((start for start in starts if _is_near_firing(read(leading, zero=start), period)), None)
+        zero = next((start for start in starts if abs(_peak(read(leading, zero=start), period)) <= NEAR_FIRING), None)
         read = partial(read, zero=zero)
     first: PressureTrace | None = None
     for k, column in zip(fired, columns, strict=True):
         one = table.model_copy(update={"pressure_column": [column]})
         later = parts[k].firing_angle - parts[fired[0]].firing_angle if table.cylinder_angles == "common" else 0.0
         trace = replace(read(one, later=later), motored=motored)
-        if not _is_near_firing(trace, period):
-            peak = math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)
+        if abs(peak := _peak(trace, period)) > NEAR_FIRING:
             other = "own" if table.cylinder_angles == "common" else "common"
             rule = f"puts the peak of {parts[k].name} {math.degrees(peak):.4g} deg after its firing"
             remedy = f'check columns and firing_order, or write cylinder_angles = "{other}"'
@@ -303,8 +302,8 @@ def _traces(
     return first, traces
 
 
-def _is_near_firing(trace: PressureTrace, period: float) -> bool:
-    return abs(math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)) <= NEAR_FIRING
+def _peak(trace: PressureTrace, period: float) -> float:
+    return math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)
 
 
 def _angle_zero(table: TraceTable, cycle: Cycle) -> str | float | None:

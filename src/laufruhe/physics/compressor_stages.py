@@ -72,8 +72,6 @@ def matched_pressures(stages: Sequence[Stage]) -> list[float] | None:
 
     A sweep solves one link after the other. A link delivers less and takes in more the higher its pressure is.
     """
-    # imported late, as it takes longer than a check
-
     links = links_of(stages)
     for _ in range(MAX_SWEEPS):
         change = 0.0

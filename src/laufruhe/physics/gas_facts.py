@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from laufruhe.machine import Chambers, Cycle, Engine, OperatingPoint, PressureTrace, SliderCrank
 from laufruhe.machine.chambers import Chamber, CylinderGases
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import OneChamber, chamber_cycle_of, pressure_at
 from laufruhe.physics.gas_loads import gas_coefficients
@@ -99,17 +101,13 @@ def _chamber_facts(
     engine: Engine, point: OperatingPoint, gas: Chambers, chamber: Chamber, fidelity: Fidelity
 ) -> GasFacts:
     """Return the key figures of one chamber, which works once a turn (G14)."""
-    parts, alone = (
-        [part for part in engine.slider_cranks if part.name in chamber.cylinders],
-        replace(gas, chambers=(chamber,)),
-    )
+    parts = [part for part in engine.slider_cranks if part.name in chamber.cylinders]
+    alone = replace(gas, chambers=(chamber,))
     torque = sum(float(gas_coefficients(alone, part, engine.cycle, fidelity).coefficients[0].real) for part in parts)
-    angles = math.tau * np.arange(_STEPS) / _STEPS
-    pressures = chamber_pressure(chamber, parts[0], angles)
-    peak = int(np.argmax(pressures > (1.0 - _ROUNDING) * pressures.max()))
+    peak, angle, minimum = _sampled_extremes(lambda angles: chamber_pressure(chamber, parts[0], angles), math.tau)
     swept = chamber.swept_volume(parts)
     return GasFacts(
-        float(pressures[peak]), math.remainder(float(angles[peak]), math.tau), float(pressures.min()),
+        peak, math.remainder(angle, math.tau), minimum,
         torque * math.tau / swept, torque, torque * point.speed,
         mean_torque(point.fmep, swept, engine.cycle.turns), swept, (),
     )  # fmt: skip
@@ -120,8 +118,12 @@ def _extremes(gas: OneChamber, part: SliderCrank, cycle: Cycle, period: float) -
     # largest pressure, its angle after firing, and least pressure
     if isinstance(gas, PressureTrace):
         return max(gas.pressures), peak_angle(np.array(gas.angles), np.array(gas.pressures)), min(gas.pressures)
-    angles = period * np.arange(_STEPS) / _STEPS
     # at a dead centre the pressure is that after ignition
-    pressures = pressure_at(gas, part, cycle, angles + _ROUNDING)
+    return _sampled_extremes(lambda angles: pressure_at(gas, part, cycle, angles + _ROUNDING), period)
+
+
+def _sampled_extremes(pressure: Callable[[Array], Array], period: float) -> tuple[float, float, float]:
+    angles = period * np.arange(_STEPS) / _STEPS
+    pressures = pressure(angles)
     peak = int(np.argmax(pressures > (1.0 - _ROUNDING) * pressures.max()))
     return float(pressures[peak]), float(angles[peak]), float(pressures.min())

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from laufruhe.errors import counted
-from laufruhe.machine import Chambers, Compressor, OperatingPoint, PressureTrace
+from laufruhe.machine import Chambers, Compressor, PressureTrace
 from laufruhe.machine.chambers import GasModel, models_of
 from laufruhe.physics.compressor_stages import Stage, links_of, matched_pressures
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
@@ -47,14 +47,15 @@ def gas_note(problem: Problem) -> list[str]:
         for several in speeds.values()
         if len(several) > 1
     ]
-    compressors = (sentence for point in problem.points for sentence in _compressors(problem, point))
+    gases = dict.fromkeys(problem.fidelity.gas_of(point) for point in problem.points)
+    compressors = (sentence for gas in gases for sentence in _compressors(problem, gas))
     return list(dict.fromkeys([*recorded, *compressors]))
 
 
-def _compressors(problem: Problem, point: OperatingPoint) -> list[str]:
+def _compressors(problem: Problem, gas: GasModel | None) -> list[str]:
     # what each stage takes in, and what one delivers more or less than the next takes in
-    gases = (gas for gas in models_of(problem.fidelity.gas_of(point)) if isinstance(gas, Chambers))
-    chambers = [(chamber, chamber.diagram) for gas in gases for chamber in gas.chambers]
+    models = (model for model in models_of(gas) if isinstance(model, Chambers))
+    chambers = [(chamber, chamber.diagram) for model in models for chamber in model.chambers]
     stages = [
         Stage(
             chamber.name, chamber.swept_volume(problem.engine.slider_cranks), diagram.back_pressure, diagram.admission,
