@@ -255,10 +255,12 @@ def _layout(key: str, text: str, _: Answers) -> Answers:
     """
     layouts, counts, angles = list[str](), list[int](), list[int]()
     # an L twin is a vee of 90 degrees, and an L4 is in line
-    plain = re.sub("-?(zylinder|cyl\\w*)|(?<=sechs)er|(?<=vier)er|(?<=acht)er", " ", text.lower())
+    plain = re.sub("-?(zylinder|cyl\\w*)", " ", text.lower())
     plain = re.sub("reihen-?", "inline ", re.sub(r"\bl[ -]?twin", "90° vee twin", plain))
     for word, degrees in re.findall(r"(\d+|[^\W\d_]+)[\s-]*(°|deg(?:rees?)?\b|grad\b)?", plain):
-        layout, count = trade_value("layout", word), trade_value("cylinders", word)
+        layout = trade_value("layout", word)
+        # a Sechser has six
+        count = trade_value("cylinders", word) or trade_value("cylinders", word.removesuffix("er"))
         if word.isdigit():
             (angles if degrees or int(word) > _MOST_CYLINDERS else counts).append(int(word))
         elif layout in _USUAL_LAYOUTS:

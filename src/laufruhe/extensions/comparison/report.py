@@ -21,11 +21,10 @@ from laufruhe.extensions.comparison.rows import (
 )
 from laufruhe.present import picture as p
 from laufruhe.report import files
-from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
+from laufruhe.report.document import Block, Bullets, Document, Illustration, reproduction
 from laufruhe.report.screen import show_document
-from laufruhe.report.strict_json import made_with
 from laufruhe.report.table_files import write_csv
-from laufruhe.report.web_page import as_html
+from laufruhe.report.web_page import write_pages
 from laufruhe.units import readable
 
 NAME, TABLE = "comparison", "comparison.csv"
@@ -46,22 +45,21 @@ def compared(
     if assumptions := assumptions_of(designs):
         heads.append(Bullets("Assumptions:", assumptions))
     tables = tables_of(rows, designs)
-    blocks: list[Block] = [*tables, Heading("Reproduce"), Code(command), Paragraph(made_with())]
-    document = Document(f"Comparison of {names}", tuple(blocks))
+    blocks: list[Block] = [*tables, *reproduction(command)]
+    title = f"Comparison of {names}"
     if out is not None:
         names_of_files = (files.REPORT, files.PAGE, TABLE, *(f"{NAME}.{kind}" for kind in files.KINDS))
         with files.staged(files.FileSet(out, "--out", "compare", names_of_files)) as stage:
-            svg = ask("laufruhe.plots.picture:save_picture", picture_of(designs, document.title), stage / NAME, kinds)
-            whole = Document(document.title, (*heads, blocks[0], Illustration(NAME, CAPTION), *blocks[1:]))
+            svg = ask("laufruhe.plots.picture:save_picture", picture_of(designs, title), stage / NAME, kinds)
+            whole = Document(title, (*heads, blocks[0], Illustration(NAME, CAPTION), *blocks[1:]))
             write_csv(number_table(rows, designs), stage / TABLE)
-            files.write(stage / files.PAGE, as_html(whole, {NAME: svg()}))
-            files.write(stage / files.REPORT, whole.as_markdown(f".{kinds[0]}"))
+            write_pages(stage, whole, {NAME: svg()}, f".{kinds[0]}")
     failures = [
         f"{design.name}: {design.record['status']}: {design.record['message']}"
         for design in designs
         if not design.has_design
     ]
-    screen = Document(document.title, (*heads, *tables))
+    screen = Document(title, (*heads, *tables))
     return partial(show_document, screen, sys.stdout, out, files.PAGE), failures
 
 

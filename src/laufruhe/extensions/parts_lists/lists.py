@@ -24,7 +24,7 @@ Subset: TypeAlias = tuple[tuple[int, ...], ...]
 """For each list, the indices of some of its rows."""
 RANKED = 5
 """Number of best combinations that are ranked: no other one is better."""
-_HEAD = re.compile(r"(.*?)\s*(?:\[(.*)\])?")
+_HEAD = re.compile(r"^(.*?)\s*(?:\[(.*)\])?$")
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,11 @@ class PartsList:
     def with_columns(self, tables: Tables) -> PartsList:
         """Return the list with the addresses of its columns in a file; raise `Refused` for wrong heads and cells."""
         columns, prices = list[Column](), (0.0,) * len(self.rows)
-        names = [str(_HEAD.fullmatch(head)[1]) for head in self.heads]  # type: ignore[index]
+        names, units = zip(*(_HEAD.findall(head)[0] for head in self.heads), strict=True)
         for name in self.sets:
             if name not in names[1:]:
                 raise Refused(f"{self.where}.sets", name, f"is no column of {self.file}", nearest(name, names[1:]))
-        for k, (name, head) in enumerate(zip(names, self.heads, strict=True)):
+        for k, (name, unit, head) in enumerate(zip(names, units, self.heads, strict=True)):
             if k == 0 or name.startswith("("):
                 continue
             if name == "price" and name not in self.sets:
@@ -110,7 +110,6 @@ class PartsList:
                 )
                 raise self.refused(rule, remedy)
             side = next((str(p[-1]) for p in places if p[0] == "constraints" and p[-1] in ("max", "min")), "")
-            unit = str(_HEAD.fullmatch(head)[2] or "")  # type: ignore[index]
             columns.append(Column(head, unit, self._numbers(k), places, side))
         return replace(self, columns=tuple(columns), prices=prices)
 
