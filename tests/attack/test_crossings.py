@@ -19,7 +19,7 @@ from laufruhe.solvers.result import Result
 
 SEED = 500000
 SEEDS = {"transmissibility and weights": 500004, "ranks with limits": 500001}
-"""Of families whose first ones take long."""
+"""First seeds of families whose earlier ones take long."""
 QUICK = ("stars on mounts", "optional shafts and uneven throws")
 
 

@@ -88,7 +88,7 @@ def test_closed_streams(words: str, status: int, said: str, here: Path) -> None:
 
 @pytest.mark.slow
 def test_files_do_not_take_the_numbers_of_closed_streams(here: Path) -> None:
-    """What is said would stand in the middle of them; a pipe gets neither a spinner nor colours."""
+    """Keep progress out of the answer: a pipe gets neither a spinner nor colours."""
     shutil.copy(SINGLE, here / "p.toml")
     for out, streams in (("open", ""), ("closed", "-q >&- 2>&- <&-")):
         told = shell(f"evaluate p.toml --no-plots --out {out} {streams}", here)

@@ -143,5 +143,5 @@ def test_no_orders_is_refused() -> None:
 
 
 def test_every_choice_has_its_option() -> None:
-    """What a fidelity holds, a file may say."""
+    """Read every option of a fidelity from a file."""
     assert set(FidelityTable.model_fields) == {field.name for field in fields(Fidelity)}

@@ -19,7 +19,7 @@ STAGES = [
 
 
 def test_isothermal_stages_have_the_pressure_of_a_linear_equation() -> None:
-    """With n = 1 the amount is p_s V (1 + c) - c p_a V, so the pressure of two stages has a closed form."""
+    """Compare two stages of exponent 1 with their closed form: the amount is p_s V (1 + c) - c p_a V."""
     first, second = (replace(stage, exponent=1.0) for stage in STAGES[:2])
     (pressure,) = matched_pressures([first, second])
     (v, c), (w, d) = ((stage.volume, stage.clearance) for stage in (first, second))

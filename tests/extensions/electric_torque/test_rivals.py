@@ -91,7 +91,7 @@ class Rivals:
 
 @pytest.mark.parametrize("seed", first_fast(list(range(60)), 0, 0))
 def test_no_design_of_slsqp_lies_under_the_bound(seed: int) -> None:
-    """From six starts, four of them at random."""
+    """Search from six starts, four of them at random."""
     rng = np.random.default_rng(seed)
     throws, order = STARS[rng.integers(len(STARS))]
     orders = sorted(rng.choice([0.5, 1, 1.5, 2, 2.5, 3, 4, 6], int(rng.integers(1, 4)), replace=False).tolist())

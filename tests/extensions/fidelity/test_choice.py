@@ -91,7 +91,7 @@ class Swinging(SliderCrank):
 
 
 def test_rods_of_any_mechanism_count() -> None:
-    """Whether rods have inertia of their own is asked of how they move, not of one mechanism's number."""
+    """Find the inertia of rods by their motion, for every mechanism."""
     # no even star, which would cancel the swing
     engine = tractor.engine((0, 90, 200))
     own = [{field.name: getattr(part, field.name) for field in fields(part)} for part in engine.slider_cranks]
@@ -131,7 +131,7 @@ def test_parts_put_back_change_less_than_said(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", first_fast(range(40), 6, 7))
 def test_automatic_fidelity_sees_the_bends(seed: int) -> None:
-    """Its estimate is above the error of a peak too, whatever it drops."""
+    """Compare the estimate with the error of a peak, for every choice."""
     problem = problem_of_peak(seed)
     problem = replace(problem, objective=(Term(replace(problem.objective[0].measure, norm=NORMS["maximum"])),))
     choice = choose(problem, 1e-2)

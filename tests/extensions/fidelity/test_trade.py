@@ -1,4 +1,4 @@
-"""What a trade says of a fidelity's decision: how much worse it is, whether it keeps the limits, and what is left."""
+"""Test regret, violated limits and advice of a trade."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Program:
         self.costs = generator.normal(size=(3, width))
 
     def solver(self) -> ConeSolver:
-        """By its dual."""
+        """Return the solver of the program."""
         return ConeSolver(coo_array(self.rows), self.right, self.cones, self.matrices, SETTINGS)
 
 

@@ -60,7 +60,7 @@ def test_pieces_change_no_draw(tmp_path: Path) -> None:
 
 
 def angle_of(data: xr.Dataset, name: str, k: int) -> float:
-    """Of an unbalance, zero where it is not drawn."""
+    """Return the angle of an unbalance in a draw [rad], zero where it is not drawn."""
     key = f"{name.rsplit('.', 1)[0]}.angle"
     return float(data[key][k]) if key in data else 0.0
 
@@ -123,7 +123,7 @@ def test_engines_that_cannot_be_are_counted(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_ready_study_runs_and_goes_on(tmp_path: Path) -> None:
-    """With a tenth of its draws of designs, and a third of its engines."""
+    """Run the ready study with a tenth of its designs and a third of its engines."""
     text = (PROBLEMS / "many-designs.toml").read_text(encoding="utf-8")
     text = changed(changed(text, "draws = 20_000", "draws = 2_000"), "draws = 24\nchunk = 8", "draws = 8\nchunk = 4")
     for name in (SINGLE, FOUR, "tractor-four-lanchester-and-moment.toml"):

@@ -422,7 +422,7 @@ def test_the_tightest_limit_keeps_away_from_stops() -> None:
 
 @pytest.mark.slow
 def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
-    """Of 50 designs with stops: those under the bound break the limit, and the search comes near to the bound."""
+    """Draw 50 designs with stops: those under the bound break the limit, and the search comes near to the bound."""
     problem = stopped("1.05 mm", objective={"minimise": "run-up force"}, search={"starts": 1})
     result = laufruhe.solve(problem)
     assert result.certificate.kind is Proof.GLOBAL

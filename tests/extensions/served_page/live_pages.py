@@ -88,7 +88,7 @@ def problem_of(name: str) -> Problem:
 
 
 def model_of(problem: Problem) -> LiveModel:
-    """Of the problem as it is given."""
+    """Return the model of a page for the initial design."""
     return live_model(problem, evaluate_only(problem))
 
 

@@ -1,4 +1,4 @@
-"""What a page is given: the same loads, a file that reads as the same design, and words for what does not move."""
+"""Test the model of a page: its loads, its file of a design, and sentences on what does not move."""
 
 from __future__ import annotations
 

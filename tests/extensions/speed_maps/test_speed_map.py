@@ -48,7 +48,7 @@ def elastic(folder: Path, damping: str = "0.1") -> Path:
 
 
 def test_values_are_those_of_the_exact_model(tmp_path: Path) -> None:
-    """As given and at the proven optimum, at every speed and at the operating point's own between them."""
+    """Compare the initial and the optimal design at every speed, and at that of the operating point."""
     path = PROBLEMS / "tractor-four-lanchester.toml"
     problem = load(path)
     data = computed(tmp_path, part(str(path), 'from = "1000 rpm", to = "2600 rpm", step = "500 rpm"'))
@@ -78,7 +78,7 @@ def test_old_names_of_designs_are_read_with_a_warning(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_orders_peak_where_they_meet_a_mode(tmp_path: Path) -> None:
-    """Of a damped block: the highest peak of order 2 lies within two percent of half a natural frequency."""
+    """Find the highest peak of order 2 of a damped block within two percent of half a natural frequency."""
     path = elastic(tmp_path)
     speeds, more = 'from = "100 rpm", to = "1500 rpm", step = "2 rpm"', 'by_order = true\ndesigns = ["initial"]'
     measures = '\nmeasures = [{ quantity = "maximum mount travel", limit = "1 mm" }]'

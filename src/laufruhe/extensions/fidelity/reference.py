@@ -1,4 +1,4 @@
-"""One design by the best model, with which cheaper fidelities are compared (F6, F9)."""
+"""Reference of fidelities: a design by the best model (F6, F9)."""
 
 from __future__ import annotations
 
