@@ -644,12 +644,33 @@ def test_one_record_at_several_speeds_is_said(tmp_path: Path) -> None:
     points = "".join(f'[[operating_points]]\nspeed = "{n} rpm"\n' for n in (800, 3000))
     assert any("One record counts at 2 speeds" in line for line in gas_lines(with_points(tmp_path, points)))
     seiliger = '[[operating_points]]\nspeed = "800 rpm"\npressure_file = "none.csv"\n'
-    with pytest.raises(InputError, match=r"gas.file = .none.csv."):
+    with pytest.raises(InputError, match=r"operating_points\[1\].pressure_file.file = .none.csv."):
         with_points(tmp_path, seiliger)
 
 
+def test_a_record_of_a_point_has_keys_of_its_own(tmp_path: Path) -> None:
+    later = np.column_stack([DEGREES + 90.0, 1.0 + 0.3 * (P - 1.0), P])
+    np.savetxt(tmp_path / "later.csv", later, "%.6f", ";", header="angle [deg];idle [bar];full [bar]", comments="")
+    own = '{ file = "later.csv", pressure_column = 3, angle_zero = "-90 deg", peg = { at = -180, to = "2 bar" } }'
+    point = '[[operating_points]]\nspeed = "800 rpm"\npressure_file = '
+    problem = with_points(tmp_path, f'{point}"full.csv"\n{point}{own}\nname = "boosted"\n', 'angle_zero = "firing"')
+    common, boosted = (cylinder_facts(problem.engine, point)[0][1] for point in problem.points)
+    assert boosted.peak_angle == pytest.approx(common.peak_angle, abs=1e-3)
+    rise = 2e5 - 1e5 * np.interp(-180.0, DEGREES, P)
+    assert boosted.peak_pressure - common.peak_pressure == pytest.approx(rise, rel=0.02)
+    for wrong, match in (
+        ('{ file = "later.csv", angle_zero = "top" }', r"operating_points\[1\].pressure_file.angle_zero = .top."),
+        ('{ file = "later.csv", angel_zero = 0 }', r"operating_points\[1\].pressure_file.angel_zero = 0: .*'angle_zero'"),
+    ):
+        with pytest.raises(InputError, match=match):
+            with_points(tmp_path, f"{point}{wrong}\n")
+
+
+@pytest.mark.parametrize("is_motored", [True, False])
 @pytest.mark.parametrize(("late", "is_doubted"), [(0.8, True), (-0.5, False)])
-def test_a_motored_pressure_peaks_before_dead_centre(tmp_path: Path, late: float, is_doubted: bool) -> None:
+def test_a_motored_pressure_peaks_before_dead_centre(
+    tmp_path: Path, late: float, is_doubted: bool, is_motored: bool
+) -> None:
     since = np.radians(DEGREES - late)
     motored = 1.0 + 20.0 * np.exp(-((np.remainder(since + math.pi, 2.0 * math.pi) - math.pi) ** 2) / 0.1) * (
         np.abs(since) < 3.0
@@ -659,7 +680,7 @@ def test_a_motored_pressure_peaks_before_dead_centre(tmp_path: Path, late: float
     text = f'title = "Recorded"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n{SINGLE}[gas]\nmodel = "trace"\n'
     text += 'file = "full.csv"\nangle_zero = "firing"\npressure_column = 2\nmotored_column = 3\n'
     path = tmp_path / "motored.toml"
-    path.write_text(text + '[[operating_points]]\nspeed = "800 rpm"\nmotored = true\n')
+    path.write_text(text + '[[operating_points]]\nspeed = "800 rpm"\n' + "motored = true\n" * is_motored)
     doubts = [str(doubt) for doubt in load(path).plausibility_warnings]
     assert len(doubts) == is_doubted
     assert all(

@@ -147,14 +147,12 @@ class WiebeTable(ChargeTable, FiredTable):
     heat_ratio: f.Positive | None = None
 
 
-class TraceTable(RecordedTable, FiredTable):
-    """A recorded cylinder pressure."""
+class RecordedGasTable(RecordedTable):
+    """Recorded pressures of the cylinders of an engine."""
 
-    model: Literal["trace"]
     angle_zero: f.Side | None = f.optional(
         'Crank angle after firing at which the file counts zero, or its dead centre: "firing" or "gas exchange".'
     )
-    crankcase_pressure: f.PositivePressure | None = None
     cylinder_columns: Annotated[list[Column], Field(min_length=1, max_length=48)] | None = f.optional(
         "Names or numbers of the columns with the pressures of cylinders 1, 2, 3, ..., in place of pressure_column."
     )
@@ -167,6 +165,13 @@ class TraceTable(RecordedTable, FiredTable):
         'that of cylinder 1 ("common").',
         "own",
     )
+
+
+class TraceTable(RecordedGasTable, FiredTable):
+    """A recorded cylinder pressure."""
+
+    model: Literal["trace"]
+    crankcase_pressure: f.PositivePressure | None = None
 
 
 class ChambersTable(Table):
@@ -185,10 +190,12 @@ def needs_bore(table: GasTable | None) -> bool:
     return table is not None and not isinstance(table, ChambersTable)
 
 
-def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> GasModel | None:
+def gas_of(
+    table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank], where: str = "gas"
+) -> GasModel | None:
     """Return the gas model of the engine, or None without [gas]; traces are in the folder of the problem file.
 
-    The chambers of the slider-cranks are checked.
+    `where` is the key of the recorded pressures in complaints. The chambers of the slider-cranks are checked.
     """
     if table is None:
         return None
@@ -202,7 +209,7 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
         single = _single_chambers(table, folder, parts, air)
         common: CommonGas
         if isinstance(table, TraceTable):
-            common, traces = _traces(table, folder, cycle, parts, air)
+            common, traces = _traces(table, folder, cycle, parts, air, where)
             single |= traces
         else:
             common = table.makes(**_numbers(table))
@@ -256,17 +263,17 @@ def _single_chambers(table: FiredTable, folder: Path, parts: Sequence[SliderCran
 
 
 def _traces(
-    table: TraceTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank], air: float
+    table: TraceTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank], air: float, where: str
 ) -> tuple[PressureTrace, dict[str, CommonGas]]:
     """Return the recorded trace of cylinder 1, and those of the cylinders with columns of their own, by names."""
     chamber_cycle, pace = chamber_cycle_of(parts[0], cycle) if parts else (cycle, 1.0)
-    zero, columns = _angle_zero(table, chamber_cycle), table.cylinder_columns
-    read = partial(recorded_trace, folder=folder, where="gas", cycle=chamber_cycle, pace=pace, air=air, zero=zero)
+    zero, columns = _angle_zero(table, chamber_cycle, f"{where}.angle_zero"), table.cylinder_columns
+    read = partial(recorded_trace, folder=folder, where=where, cycle=chamber_cycle, pace=pace, air=air, zero=zero)
     motored = None
     if table.motored_column is not None:
         if table.pressure_column is None and columns is None:
             rule = "is given without pressure_column, which has the pressure with combustion"
-            raise Refused("gas.motored_column", table.motored_column, rule, "name both columns")
+            raise Refused(f"{where}.motored_column", table.motored_column, rule, "name both columns")
         motored = replace(read(table.model_copy(update={"pressure_column": [table.motored_column]})), is_motored=True)
     if table.single_cylinders:
         rule, remedy = "means nothing with model trace", "name a column of each cylinder by cylinder_columns"
@@ -274,17 +281,18 @@ def _traces(
     if columns is None:
         return replace(read(table), motored=motored), {}
     if table.pressure_column is not None:
-        raise Refused("gas.pressure_column", None, "is given beside cylinder_columns", "keep one")
+        raise Refused(f"{where}.pressure_column", None, "is given beside cylinder_columns", "keep one")
     fired = [k for k, part in enumerate(parts) if part.bore != 0.0 and not any(map(part.faces, parts[:k]))]
     if len(columns) != len(fired):
         rule = f"has {counted(len(columns), 'column')} for {counted(len(fired), 'cylinder')} that fire"
-        raise Refused("gas.cylinder_columns", None, rule, "name one column for each cylinder, by its number")
+        raise Refused(f"{where}.cylinder_columns", None, rule, "name one column for each cylinder, by its number")
     traces, period = dict[str, CommonGas](), chamber_cycle.angle / pace
     if zero is None and table.cylinder_angles == "common" and chamber_cycle is Cycle.FOUR_STROKE:
         # one zero for all columns, so that none hides a wrong order of firing
         leading = table.model_copy(update={"pressure_column": [columns[0]]})
-        starts = ("firing", "gas exchange")
-        zero = next((start for start in starts if abs(_peak(read(leading, zero=start), period)) <= NEAR_FIRING), None)
+        peak, starts = _peak(read(leading, zero="firing"), period), {"firing": 0.0, "gas exchange": 0.5 * period}
+        near = (name for name, start in starts.items() if abs(math.remainder(peak + start, period)) <= NEAR_FIRING)
+        zero = next(near, None)
         read = partial(read, zero=zero)
     first: PressureTrace | None = None
     for k, column in zip(fired, columns, strict=True):
@@ -295,9 +303,9 @@ def _traces(
             other = "own" if table.cylinder_angles == "common" else "common"
             rule = f"puts the peak of {parts[k].name} {math.degrees(peak):.4g} deg after its firing"
             remedy = f'check columns and firing_order, or write cylinder_angles = "{other}"'
-            raise Refused("gas.cylinder_columns", column, rule, remedy)
+            raise Refused(f"{where}.cylinder_columns", column, rule, remedy)
         first = first or trace
-        traces |= dict.fromkeys(names_of_cylinders([k + 1], parts, "gas.cylinder_columns"), trace)
+        traces |= dict.fromkeys(names_of_cylinders([k + 1], parts, f"{where}.cylinder_columns"), trace)
     assert first is not None
     return first, traces
 
@@ -306,9 +314,9 @@ def _peak(trace: PressureTrace, period: float) -> float:
     return math.remainder(trace.angles[int(np.argmax(trace.pressures))], period)
 
 
-def _angle_zero(table: TraceTable, cycle: Cycle) -> str | float | None:
+def _angle_zero(table: TraceTable, cycle: Cycle, key: str) -> str | float | None:
     # a name, or a crank angle after firing [rad]
-    zero, key = table.angle_zero, "gas.angle_zero"
+    zero = table.angle_zero
     if zero == "gas exchange" and cycle is Cycle.TWO_STROKE:
         raise Refused(key, zero, "does not suit a two-stroke cycle, whose dead centres all fire", "leave it out")
     if zero is None or zero in ("firing", "gas exchange"):

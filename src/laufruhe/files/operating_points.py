@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
@@ -17,7 +17,7 @@ from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, 
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.cylinder_states import StateTable, cylinder_states
 from laufruhe.files.fields import Name, Table
-from laufruhe.files.gas import GasTable, SeiligerTable, WiebeTable
+from laufruhe.files.gas import GasTable, RecordedGasTable, SeiligerTable, WiebeTable
 from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.machine.chambers import CommonGas, CylinderGases, models_of
 from laufruhe.machine.gas import AMBIENT_PRESSURE
@@ -32,6 +32,15 @@ SAME_SPEED = 0.01
 """Relative difference of speeds within which rows of a fuel table belong together."""
 
 
+RecordedFileTable: TypeAlias = Annotated[
+    RecordedGasTable,
+    BeforeValidator(
+        lambda raw: {"file": raw} if isinstance(raw, str) else raw, json_schema_input_type=str | RecordedGasTable
+    ),
+]
+"""Recorded pressures by the name of their file, or with keys of their own."""
+
+
 class OperatingPointTable(StateTable):
     """A speed and a load."""
 
@@ -44,8 +53,9 @@ class OperatingPointTable(StateTable):
         "Absolute pressure in the manifold at this point, in place of that of [gas]; 0.3 to 0.5 bar in a throttled "
         "engine at idle."
     )
-    pressure_file: str | None = f.optional(
-        "File of the pressure recorded at this point, read as that of [gas] with model trace."
+    pressure_file: RecordedFileTable | None = f.optional(
+        "File of the pressure recorded at this point, read as that of [gas] with model trace; or a table with the file "
+        "and with keys in place of those of [gas], such as angle_zero."
     )
     bmep: f.NonNegativePressure | None = f.optional(
         "Brake mean effective pressure, 0 at idle; [friction] adds what friction takes, and its uncertainty. With a "
@@ -168,11 +178,11 @@ def with_load(table: GasTable | None, points: Sequence[OperatingPointTable]) -> 
 
 def operating_points(
     tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float | None,
-    brake: Brake | None, parts: Sequence[SliderCrank], read: Callable[[str, str], GasModel | None],
+    brake: Brake | None, parts: Sequence[SliderCrank], read: Callable[[RecordedGasTable, str], GasModel | None],
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
     """Return the operating points of a file; points that give no load have the gas of [gas].
 
-    `read` returns the gas of a recorded file, and names a key in complaints. The stroke [m] turns a mean piston speed
+    `read` returns the gas of recorded pressures, and names their key in complaints. The stroke [m] turns a mean piston speed
     into a crank speed; it is None for an engine without pistons. `parts` are the slider-cranks in the order of cylinder
     numbers.
     """

@@ -34,7 +34,7 @@ from laufruhe.files.fidelity import with_fidelity
 from laufruhe.files.fields import check_format
 from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
-from laufruhe.files.gas import SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
+from laufruhe.files.gas import RecordedGasTable, SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
 from laufruhe.files.load_torque import load_torque_of
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import axes_sentences, load_cases_of, mounts_of
@@ -327,10 +327,11 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     gas_table = with_load(file.gas, file.operating_points)
     gas = gas_of(gas_table, path.parent, cycle, cylinders)
 
-    def recorded(name: str, where: str) -> GasModel | None:
+    def recorded(one: RecordedGasTable, where: str) -> GasModel | None:
         if not isinstance(gas_table, TraceTable):
-            raise Refused(where, name, "needs [gas] with model trace", "give [gas] that model and a file")
-        return gas_of(gas_table.model_copy(update={"file": name}), path.parent, cycle, cylinders)
+            raise Refused(where, one.file, "needs [gas] with model trace", "give [gas] that model and a file")
+        keys = {key: getattr(one, key) for key in one.model_fields_set}
+        return gas_of(gas_table.model_copy(update=keys), path.parent, cycle, cylinders, where)
 
     points = operating_points(file.operating_points, gas, cycle, table.stroke, brake, cylinders, recorded)
     if without_gas:

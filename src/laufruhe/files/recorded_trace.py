@@ -29,7 +29,6 @@ _OTHER_NAME = re.compile(
     re.IGNORECASE,
 )
 """Heading of a column that is no cycle with combustion: computed from several cycles, or motored."""
-_CYLINDER_NAME = re.compile(r"^(?:p|p?[ _]?(?:cyl|zyl)[a-z]*[ ._-]*)\d+\s*(?:[\[(/].*)?$", re.IGNORECASE)
 _GAUGE_NAME = re.compile(r"gauge|überdruck|ueberdruck", re.IGNORECASE)
 _ALIKE = 0.9
 """Least correlation of columns that are cycles of one cylinder."""
@@ -98,6 +97,8 @@ class Quantity:
         Unit of a file that names none, and of sentences, and its number in one SI unit.
     what
         Name of its column in a complaint.
+    cylinder_heading
+        Pattern of the heading of one cylinder's column; None if the quantity is not that of a cylinder.
     """
 
     name: str
@@ -105,13 +106,17 @@ class Quantity:
     unit: str
     factor: float
     what: str
+    cylinder_heading: re.Pattern[str] | None = None
 
     def text(self, value: float, digits: int = 4) -> str:
         """Return a value [SI] with its unit."""
         return quantity_text(self.factor * value, self.unit, digits)
 
 
-PRESSURE = Quantity("pressure", "Pa", "bar", 1e-5, "pressure of the cylinder")
+PRESSURE = Quantity(
+    "pressure", "Pa", "bar", 1e-5, "pressure of the cylinder",
+    re.compile(r"^(?:p|p?[ _]?(?:cyl|zyl)[a-z]*[ ._-]*)\d+\s*(?:[\[(/].*)?$", re.IGNORECASE),
+)  # fmt: skip
 
 
 class OverAngleTable(Table):
@@ -237,8 +242,9 @@ class RecordedFile:
             names = ", ".join(map(self.name, columns))
             raise self.refused(f"may have the {self.records.what} in {names}", f"name one by {key}")
         alike = [k for k in columns if k == first or _correlation(values[:, first], values[:, k]) > _ALIKE]
-        cylinders = [k for k in columns if _CYLINDER_NAME.search(self.numbers.names[k])]
-        if self.records is PRESSURE and len(set(alike) & set(cylinders)) > 1:
+        heading = self.records.cylinder_heading
+        cylinders = [k for k in columns if heading and heading.search(self.numbers.names[k])]
+        if len(set(alike) & set(cylinders)) > 1:
             names = ", ".join(map(self.name, cylinders))
             rule, remedy = (
                 f"may have one cylinder in each of {names}",

@@ -6,11 +6,13 @@ import math
 from collections import defaultdict
 from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from laufruhe.errors import Complaint, ModelError
 from laufruhe.machine import Engine, OperatingPoint, PressureTrace
+from laufruhe.machine.chambers import models_of
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.exact_angles import as_turn, reduced_turn
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts, gas_facts
@@ -59,6 +61,7 @@ def plausibility_warnings(
     warnings += [
         *([] if fires_together else _of_firing(engine)),
         *_of_gas(engine, points),
+        *_of_motored_traces(engine, points),
         *_of_machines(engine, points),
     ]
     first: dict[str, Complaint] = {}
@@ -217,7 +220,15 @@ def _of_trace(trace: PressureTrace, facts: GasFacts, period: float) -> Iterator[
         value, peak = (quantity_text(1e-5 * pressure, "bar") for pressure in (bottom, facts.peak_pressure))
         rule = f"is more than usual before compression to a peak of {peak}"
         yield Complaint("pressure at the bottom dead centre", value, rule, "check peg and gauge")
-    if trace.is_motored and (facts.imep > 0.0 or facts.peak_angle > 0.0):
-        rule = f"has its peak {quantity_text(facts.peak_angle, 'rad', 2)} after dead centre"
-        remedy = "check angle_zero; losses move the peak of a motored cylinder 0.3 to 1 deg before dead centre"
-        yield Complaint("motored pressure", "", rule, remedy)
+
+
+def _of_motored_traces(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
+    # also those that no operating point uses, because they show the dead centre of the file
+    for point in points:
+        traces = [gas for gas in models_of(point.gas) if isinstance(gas, PressureTrace)]
+        for trace in dict.fromkeys(trace if trace.is_motored else trace.motored for trace in traces):
+            facts = gas_facts(engine, replace(point, gas=trace))
+            if facts is not None and (facts.imep > 0.0 or facts.peak_angle > 0.0):
+                rule = f"has its peak {quantity_text(facts.peak_angle, 'rad', 2)} after dead centre"
+                remedy = "check angle_zero; losses move the peak of a motored cylinder 0.3 to 1 deg before dead centre"
+                yield Complaint("motored pressure", "", rule, remedy)

@@ -43,9 +43,10 @@ class EngineParts(Parts):
         self, name: str | None = None, *, misfire: Sequence[int] | Literal["each"] | None = None,
         cut: Sequence[int] | None = None, cut_valves: Literal["closed", "open"] | None = None,
         speed: Value | None = None, mean_piston_speed: Value | None = None, imep: Value | None = None,
-        peak_pressure: Value | None = None, intake_pressure: Value | None = None, pressure_file: str | None = None,
-        bmep: Value | None = None, brake_torque: Value | None = None, motored: bool | None = None,
-        gas: bool | None = None, up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
+        peak_pressure: Value | None = None, intake_pressure: Value | None = None,
+        pressure_file: str | Table | None = None, bmep: Value | None = None, brake_torque: Value | None = None,
+        motored: bool | None = None, gas: bool | None = None, up_to: Value | None = None, steps: int | None = None,
+        weight: Value | None = None,
     ) -> Self:
         """Return the engine with an operating point. Speeds and loads at which the engine is looked at."""
         return self._with("operating_points", "operating_point", keys_of(locals()))
@@ -76,8 +77,8 @@ class EngineParts(Parts):
         cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
         pressure_column: str | int | Sequence[str | int] | None = None, pressure_unit: str | None = None,
         gauge: bool | None = None, peg: Table | None = None, angle_zero: Number | None = None,
-        crankcase_pressure: Value | None = None, cylinder_columns: Sequence[str | int] | None = None,
-        motored_column: str | int | None = None, cylinder_angles: Literal["own", "common"] | None = None,
+        cylinder_columns: Sequence[str | int] | None = None, motored_column: str | int | None = None,
+        cylinder_angles: Literal["own", "common"] | None = None, crankcase_pressure: Value | None = None,
     ) -> Self:
         """Return the engine with gas trace. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_trace", keys_of(locals(), {'model': 'trace'}))

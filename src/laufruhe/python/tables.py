@@ -199,6 +199,18 @@ def pump(*, suction: Value, delivery: Value) -> Table:
     return keys_of(locals())
 
 
+def recorded_gas(
+    *, file: str, sheet: str | None = None, angle_column: str | int | None = None, angle_unit: str | None = None,
+    cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
+    pressure_column: str | int | Sequence[str | int] | None = None, pressure_unit: str | None = None,
+    gauge: bool | None = None, peg: Table | None = None, angle_zero: Number | None = None,
+    cylinder_columns: Sequence[str | int] | None = None, motored_column: str | int | None = None,
+    cylinder_angles: Literal["own", "common"] | None = None,
+) -> Table:
+    """Return a table `recorded_gas`. Recorded pressures of the cylinders of an engine."""
+    return keys_of(locals())
+
+
 def recorded(
     *, file: str, sheet: str | None = None, angle_column: str | int | None = None, angle_unit: str | None = None,
     cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
