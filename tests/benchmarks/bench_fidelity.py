@@ -12,31 +12,31 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     # before NumPy starts its threads
     os.environ.setdefault(name, "1")
 
-import importlib  # noqa: E402
-import math  # noqa: E402
-import sys  # noqa: E402
-from collections.abc import Callable, Sequence  # noqa: E402
-from dataclasses import replace  # noqa: E402
-from pathlib import Path  # noqa: E402
+import importlib
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 
-import numpy as np  # noqa: E402
-from pages import PAGES, ROOT, publish, spent  # noqa: E402
+import numpy as np
+from pages import PAGES, ROOT, publish, spent
 
-from laufruhe import load  # noqa: E402
-from laufruhe.files.fidelity import DEFAULT_TOLERANCE  # noqa: E402
-from laufruhe.load_models.batch import prepare  # noqa: E402
-from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
-from laufruhe.machine.layouts import build, inline  # noqa: E402
-from laufruhe.numerics.norms import NORMS  # noqa: E402
-from laufruhe.physics.fidelity import Fidelity  # noqa: E402
-from laufruhe.physics.shaking_loads import forget  # noqa: E402
-from laufruhe.problem import channels  # noqa: E402
-from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
-from laufruhe.problem.measure import Measure, Term  # noqa: E402
-from laufruhe.problem.problem import Problem  # noqa: E402
-from laufruhe.solvers import solve  # noqa: E402
-from mechanisms import mechanism_of  # noqa: E402
-from random_decisions import random_decisions  # noqa: E402
+from laufruhe import load
+from laufruhe.files.fidelity import DEFAULT_TOLERANCE
+from laufruhe.load_models.batch import prepare
+from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint
+from laufruhe.machine.layouts import build, inline
+from laufruhe.numerics.norms import NORMS
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.shaking_loads import forget
+from laufruhe.problem import channels
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers import solve
+from mechanisms import mechanism_of
+from random_decisions import random_decisions
 
 OUT = PAGES / "fidelity.md"
 DESIGNS = 100_000

@@ -17,20 +17,20 @@ from itertools import count
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
 
-import cvxpy as cp  # noqa: E402
-import numpy as np  # noqa: E402
-from pages import PAGES, ROOT, publish  # noqa: E402
-from scipy.optimize import minimize  # noqa: E402
-from threadpoolctl import threadpool_info  # noqa: E402
+import cvxpy as cp
+import numpy as np
+from pages import PAGES, ROOT, publish
+from scipy.optimize import minimize
+from threadpoolctl import threadpool_info
 
-import laufruhe  # noqa: E402
-from laufruhe.load_models.affine import AffineModel, AffineProblem  # noqa: E402
-from laufruhe.machine import Engine, OperatingPoint  # noqa: E402
-from laufruhe.numerics.arrays import Array  # noqa: E402
-from laufruhe.physics.mount_forces import rigid_mounting  # noqa: E402
-from laufruhe.physics.shaking_loads import shaking_loads  # noqa: E402
-from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
-from validation.plain_forces import PlainEngine, plain_engine  # noqa: E402
+import laufruhe
+from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.problem.evaluation import evaluate, objective_value
+from validation.plain_forces import PlainEngine, plain_engine
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester.toml"
 OUT = PAGES / "speed.md"

@@ -11,23 +11,23 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     # as in a study's own processes; threads that wait would count as processor time
     os.environ.setdefault(name, "1")
 
-import statistics  # noqa: E402
-import tempfile  # noqa: E402
-import time  # noqa: E402
-from collections.abc import Callable  # noqa: E402
-from dataclasses import replace  # noqa: E402
-from pathlib import Path  # noqa: E402
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
-import numpy as np  # noqa: E402
-from pages import PAGES, ROOT, publish  # noqa: E402
-from scipy.optimize import NonlinearConstraint, differential_evolution, minimize  # noqa: E402
+import numpy as np
+from pages import PAGES, ROOT, publish
+from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 
-from laufruhe import load  # noqa: E402
-from laufruhe.load_models.affine import AffineModel, AffineProblem  # noqa: E402
-from laufruhe.solvers import solve  # noqa: E402
-from laufruhe.solvers.cones.conic import solve_cones  # noqa: E402
-from laufruhe.studies.reader import load_study  # noqa: E402
-from laufruhe.studies.runner import run  # noqa: E402
+from laufruhe import load
+from laufruhe.load_models.affine import AffineModel, AffineProblem
+from laufruhe.solvers import solve
+from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester-and-moment.toml"
 OUT = PAGES / "sweep.md"

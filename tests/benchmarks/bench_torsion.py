@@ -10,20 +10,20 @@ import os
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
-import statistics  # noqa: E402
-import time  # noqa: E402
-from collections.abc import Callable  # noqa: E402
-from dataclasses import replace  # noqa: E402
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import replace
 
-import numpy as np  # noqa: E402
-import opentorsion  # noqa: E402
-from pages import PAGES, ROOT, publish  # noqa: E402
+import numpy as np
+import opentorsion
+from pages import PAGES, ROOT, publish
 
-import laufruhe  # noqa: E402
-from laufruhe.extensions.torsion.machine import Torsion  # noqa: E402
-from laufruhe.extensions.torsion.physics import chain_of, natural_modes, throw_torques, twist  # noqa: E402
-from laufruhe.files.reader import load_tables, tables_of  # noqa: E402
-from laufruhe.machine import Engine  # noqa: E402
+import laufruhe
+from laufruhe.extensions.torsion.machine import Torsion
+from laufruhe.extensions.torsion.physics import chain_of, natural_modes, throw_torques, twist
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.machine import Engine
 
 PROBLEM = ROOT / "problems" / "inline-five-torsion.toml"
 OUT = PAGES / "torsion.md"

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from dataclasses import asdict, dataclass, fields
+from importlib import import_module
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,10 +43,8 @@ class Answer:
 def answered(path: Path) -> Answer:
     """In this process, on one processor."""
     # libraries are loaded before the clock starts, so that versions are compared and not imports
-    import casadi  # noqa: F401
-    import clarabel  # noqa: F401
-    import cvxpy  # noqa: F401
-
+    for library in ("casadi", "clarabel", "cvxpy"):
+        import_module(library)
     from laufruhe import load, solve
 
     problem = load(path)

@@ -659,8 +659,8 @@ def test_a_record_of_a_point_has_keys_of_its_own(tmp_path: Path) -> None:
     rise = 2e5 - 1e5 * np.interp(-180.0, DEGREES, P)
     assert boosted.peak_pressure - common.peak_pressure == pytest.approx(rise, rel=0.02)
     for wrong, match in (
-        ('{ file = "later.csv", angle_zero = "top" }', r"operating_points\[1\].pressure_file.angle_zero = .top."),
-        ('{ file = "later.csv", angel_zero = 0 }', r"operating_points\[1\].pressure_file.angel_zero = 0: .*'angle_zero'"),
+        ('{ file = "later.csv", angle_zero = "top" }', r"pressure_file.angle_zero = .top."),
+        ('{ file = "later.csv", angel_zero = 0 }', r"pressure_file.angel_zero = 0: .*'angle_zero'"),
     ):
         with pytest.raises(InputError, match=match):
             with_points(tmp_path, f"{point}{wrong}\n")

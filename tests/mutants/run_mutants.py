@@ -28,6 +28,7 @@ import time
 from collections import defaultdict
 from collections.abc import Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -217,7 +218,8 @@ def run(arguments: argparse.Namespace) -> None:
         if entry["outcome"] == KILLED:
             killers[key] = entry["failed"]
         passed[key].update(entry["passed"])
-    _import_libraries()
+    for library in ("casadi", "clarabel", "cvxpy", "matplotlib", "pint", "pydantic", "scipy.optimize", "typer"):
+        import_module(library)
     found: list[Found] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder, LOG.open("a", encoding="utf-8") as log:
         copies: SimpleQueue[Path] = SimpleQueue()
@@ -290,17 +292,6 @@ def page(found: Iterable[Found], same: dict[str, str], tests: int, arguments: ar
     lines += ["", "## Equivalent", ""]
     lines += [f"- `{mutant}`: {same[mutant.change]}" for mutant, said, _ in found if said == SAME] or ["None."]
     return "\n".join(lines) + "\n"
-
-
-def _import_libraries() -> None:
-    import casadi  # noqa: F401
-    import clarabel  # noqa: F401
-    import cvxpy  # noqa: F401
-    import matplotlib  # noqa: F401
-    import pint  # noqa: F401
-    import pydantic  # noqa: F401
-    import scipy.optimize  # noqa: F401
-    import typer  # noqa: F401
 
 
 def main() -> None:

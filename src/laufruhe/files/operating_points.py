@@ -182,9 +182,9 @@ def operating_points(
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
     """Return the operating points of a file; points that give no load have the gas of [gas].
 
-    `read` returns the gas of recorded pressures, and names their key in complaints. The stroke [m] turns a mean piston speed
-    into a crank speed; it is None for an engine without pistons. `parts` are the slider-cranks in the order of cylinder
-    numbers.
+    `read` returns the gas of recorded pressures, and names their key in complaints. The stroke [m] turns a mean piston
+    speed into a crank speed; it is None for an engine without pistons. `parts` are the slider-cranks in the order of
+    cylinder numbers.
     """
     points = []
     for k, table in enumerate(tables, 1):
