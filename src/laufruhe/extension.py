@@ -106,6 +106,9 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "tolerance": "robust",
     },
     "commands": {
+        "engines": "beginning",
+        "examples": "beginning",
+        "init": "beginning",
         "page": "served_page",
         "balance": "balancing",
         "compare": "comparison",

@@ -10,8 +10,8 @@ import pytest
 
 from laufruhe import units
 from laufruhe.errors import InputError
+from laufruhe.extensions.beginning.drafts import draft_of_engine
 from laufruhe.files.catalogue import engines
-from laufruhe.files.drafts import draft_of_engine
 from laufruhe.files.reader import load
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.problem import Problem

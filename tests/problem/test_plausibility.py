@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from laufruhe import InputError, load
+from laufruhe.extensions.beginning.drafts import draft_of_engine
 from laufruhe.files.catalogue import engines
-from laufruhe.files.drafts import draft_of_engine
 from laufruhe.units import DECIMAL_COMMA
 from problem_files import READY
 from recorded_cycle import cycle_pressure

@@ -83,7 +83,7 @@ def test_a_wheel_carries_its_data(tmp_path: Path) -> None:
     ready = {f"problems/{path.name}" for path in (ROOT / "problems").iterdir() if path.is_file()}
     assert {f"laufruhe/{name}" for name in own | ready} <= names
     assert any(name.endswith("licenses/LICENSE") for name in names)
-    say = "import laufruhe.cli.begin as b; print(b.__file__); print(b.ready_list())"
+    say = "import laufruhe.extensions.beginning.files as b; print(b.__file__); print(b.ready_list())"
     env = {**os.environ, "PYTHONPATH": str(tmp_path / "installed")}
     told = subprocess.run(
         [sys.executable, "-c", say], cwd=tmp_path, env=env, check=True, capture_output=True, text=True

@@ -112,44 +112,6 @@ app = typer.Typer(
 )
 
 
-@app.command(epilog=o.examples("laufruhe init", "laufruhe init mine.toml --from vw-ea827-2-0"))
-def init(
-    file: o.FileArgument = Path("problem.toml"),
-    name: o.FromOption = None,
-) -> None:
-    """Write a commented problem file to start from.
-
-    Asks about the engine, unless --from names one. The schema that editors use comes with it.
-    """
-    with exit_statuses(file):
-        from laufruhe.cli.begin import write_draft
-
-        typer.echo(write_draft(file, name), nl=False)
-
-
-@app.command(epilog=o.examples("laufruhe examples", "laufruhe examples tractor-single tractor-sweeps --to mine"))
-def examples(
-    names: o.NamesArgument = None,
-    to: o.ToOption = Path(),
-) -> None:
-    """List the ready problems by use, or copy some of them."""
-    with exit_statuses(to):
-        from laufruhe.cli.begin import copy_ready, ready_list
-
-        typer.echo(copy_ready(names, to) if names else ready_list(), nl=False)
-
-
-@app.command(epilog=o.examples("laufruhe engines", "laufruhe engines bmw-b48"))
-def engines(
-    names: o.KeysArgument = None,
-) -> None:
-    """List the engines of the catalogue, or show some."""
-    with exit_statuses(Path("laufruhe")):
-        from laufruhe.cli.begin import engine_details, engine_list
-
-        typer.echo(engine_details(names) if names else engine_list(), nl=False)
-
-
 @app.command(
     epilog=o.examples("laufruhe solve problem.toml", "laufruhe solve problem.toml --time-limit 60 --json result.json")
 )

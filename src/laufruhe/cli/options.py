@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -13,17 +12,6 @@ import typer
 def examples(*lines: str) -> str:
     """Return the examples at the end of a command's help."""
     return "\b\n" + "\n".join([f"Example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
-
-
-def _completed(kinds: str) -> Callable[[str], list[str]]:
-    def names(incomplete: str) -> list[str]:
-        from laufruhe.files.catalogue import engines
-        from laufruhe.files.ready import ready
-
-        names_by_kind = {"engines": engines, "problems": ready}
-        return [name for kind in kinds.split() for name in names_by_kind[kind]() if name.startswith(incomplete)]
-
-    return names
 
 
 FILE = "Problem file (TOML); - reads standard input."
@@ -72,22 +60,6 @@ SCHEDULER = "Let the Dask workers of the scheduler at ADDRESS do the work."
 SchedulerOption = Annotated[str | None, typer.Option("--scheduler", metavar="ADDRESS", help=SCHEDULER)]
 STUDY = "Study file (TOML); - reads standard input."
 StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help=STUDY, show_default=False, readable=False)]
-FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Problem file to write.")]
-FROM = "Engine of the catalogue, or ready problem, to start from."
-COPIED = "Ready problems to copy, with all files that they refer to."
-ENGINE_ARGUMENT = "Engines to show: published figures, source, and assumptions."
-FromOption = Annotated[
-    str | None, typer.Option("--from", metavar="NAME", help=FROM, autocompletion=_completed("engines problems"))
-]
-NamesArgument = Annotated[
-    list[str] | None,
-    typer.Argument(metavar="[NAME...]", help=COPIED, show_default=False, autocompletion=_completed("problems")),
-]
-ToOption = Annotated[Path, typer.Option("--to", metavar="DIR", help="Folder of the copies.")]
-KeysArgument = Annotated[
-    list[str] | None,
-    typer.Argument(metavar="[KEY...]", help=ENGINE_ARGUMENT, show_default=False, autocompletion=_completed("engines")),
-]
 QUIET = "Print errors only."
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)]
 VERBOSE = "Print every step on standard error, in a pipe too."

@@ -215,7 +215,9 @@ def test_nothing_is_asked_for_a_file_that_is_there(here: Path) -> None:
 
 def test_ctrl_c_at_a_question_ends_as_everywhere(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # an end of what is typed at a terminal is told in the same way
-    monkeypatch.setattr("laufruhe.cli.questions.sys", SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True)))
+    monkeypatch.setattr(
+        "laufruhe.extensions.beginning.questions.sys", SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
+    )
     found = run.invoke(app, ["init"], input="\n")
     assert found.exit_code == 130
     assert found.stderr == "\nlaufruhe: interrupted, nothing was written\n"

@@ -1,4 +1,4 @@
-"""Commands to begin with: a draft of a problem file, ready problems to copy, catalogue engines."""
+"""Draft of a problem file, copies of ready problems, and lists of both and of catalogue engines."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.cli.questions import Answers, ask, ask_engine, layout_of
 from laufruhe.cli.screen import typed
 from laufruhe.errors import InputError, printed, refused
-from laufruhe.files import drafts, ready
+from laufruhe.extensions.beginning import drafts
+from laufruhe.extensions.beginning.questions import Answers, ask, ask_engine, layout_of
+from laufruhe.files import ready
 from laufruhe.files.catalogue import engine_named, engines
 from laufruhe.files.complaints import errors_in_file, nearest
 from laufruhe.files.toml_text import toml_value
