@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from laufruhe import load
 from laufruhe.errors import ModelError
+from laufruhe.extensions.balance_studies.free_forces import FreeLoad, free_load
 from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.layouts import Layout, build, even_throws, inline, vee
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.studies.kinds.free_forces import FreeLoad, free_load
 from mechanisms import mechanism_of
 from one_cylinder import rotating_loads
 from problem_files import PROBLEMS

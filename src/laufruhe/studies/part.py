@@ -40,7 +40,7 @@ class Store(Protocol):
 class Part(Table):
     """Part of a study: its cases, and how they become points, records, a dataset, a table and a picture.
 
-    A kind is a subclass in a module of `laufruhe.studies.kinds` with its name as `kind: Literal[...]`;
+    A kind is a subclass in the table `laufruhe.studies.kinds.KINDS`, with its name as `kind: Literal[...]`;
     it is found there. Its fields are its keys in the study file.
     """
 

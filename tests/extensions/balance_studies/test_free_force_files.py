@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from laufruhe.extensions.balance_studies.free_forces import count_agreeing
 from laufruhe.plots.picture import draw
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.kinds.free_forces import count_agreeing
 from problem_files import PROBLEMS
 from studies.parts import part_of, told
 
