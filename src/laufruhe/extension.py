@@ -141,6 +141,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     },
     "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
+    "norms": {"rmq": "root_mean_quad"},
     "layouts": {"rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")

@@ -144,9 +144,10 @@ class MeasureContext:
     def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
         """Return the measure of a quantity with the keys of its table, checked for this engine."""
         if name not in MEASURES:
-            home = next((home for channel, home in HOMES["channels"].items() if name.endswith(channel)), None)
-            if home:
-                raise Refused(where, name, *missing_extension(home))
+            homes = [home for channel, home in HOMES["channels"].items() if name.endswith(channel)]
+            homes += [home for norm, home in HOMES["norms"].items() if name.startswith(norm)]
+            if homes:
+                raise Refused(where, name, *missing_extension(homes[0]))
             usual = _HIGHEST.sub("maximum", name)
             raise Refused(where, name, "is no quantity", nearest(usual, list(MEASURES)))
         channel, key = MEASURES[name][0], where.rsplit(".", 1)[0]

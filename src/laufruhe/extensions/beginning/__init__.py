@@ -2,5 +2,5 @@
 
 from laufruhe.extension import Extension
 
-_COMMANDS = "laufruhe.extensions.beginning.commands"
-EXTENSION = Extension("beginning", commands=tuple(f"{_COMMANDS}:{name}" for name in ("INIT", "EXAMPLES", "ENGINES")))
+_HERE = "laufruhe.extensions.beginning.command"
+EXTENSION = Extension("beginning", commands=tuple(f"{_HERE}:{name}" for name in ("INIT", "EXAMPLES", "ENGINES")))
