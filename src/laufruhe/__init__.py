@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
     from laufruhe import machine as machine
     from laufruhe import plots as plots
+    from laufruhe.extensions.own_measures.measures import own_measure
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.number_types import open_number as open
-    from laufruhe.problem.own_measures import own_measure
     from laufruhe.problem.problem import Problem
     from laufruhe.python import tables as tables
     from laufruhe.python.draft import EngineDraft
@@ -58,7 +58,7 @@ _LAYOUTS = ("boxer", "delta", "engine", "inline", "opposed_piston", "parts", "ra
 # imported at first use, so that import laufruhe is quick
 _ELSEWHERE = {
     "EngineDraft": "laufruhe.python.draft",
-    "own_measure": "laufruhe.problem.own_measures",
+    "own_measure": "laufruhe.extensions.own_measures.measures",
     "Problem": "laufruhe.python.draft",
     "Result": "laufruhe.python.results",
     **dict.fromkeys(("Progress", "ProgressLine"), "laufruhe.python.watch"),
@@ -123,7 +123,9 @@ if not TYPE_CHECKING:
             return import_module(_MODULES[name])
         if name not in _ELSEWHERE:
             raise AttributeError(f"module 'laufruhe' has no attribute '{name}'")
-        return getattr(import_module(_ELSEWHERE[name]), name)
+        from laufruhe.extension import object_at
+
+        return object_at(f"{_ELSEWHERE[name]}:{name}")
 
 
 def __dir__() -> list[str]:
@@ -357,13 +359,9 @@ def identify(problem: Problem | Source) -> Any:
     InputError
         If the problem or a measurement is wrong.
     """
-    from importlib.util import find_spec
+    from laufruhe.extension import object_at
 
-    from laufruhe.extension import missing_extension
-
-    if find_spec("laufruhe.extensions.identification") is None:
-        raise ModelError(f"laufruhe.identify {'; '.join(missing_extension('identification'))}")
-    return import_module("laufruhe.extensions.identification.report").identify(_problem(problem))
+    return object_at("laufruhe.extensions.identification.report:identify")(_problem(problem))
 
 
 @_on_one_thread

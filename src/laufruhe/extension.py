@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, Literal
@@ -155,6 +156,14 @@ INSTALL = "install laufruhe with all its folders"
 def missing_extension(extension: str) -> tuple[str, str]:
     """Return rule and remedy for a file that needs an extension of this package that is not installed."""
     return f"needs the extension '{extension}', which is not installed", INSTALL
+
+
+def object_at(address: str) -> Any:
+    """Return an object by its address `module:name`; raise `ModelError` if its extension is not installed."""
+    module, _, name = address.partition(":")
+    if module.startswith(GROUP) and find_spec(home := ".".join(module.split(".")[:3])) is None:
+        raise ModelError(f"laufruhe.{name} {'; '.join(missing_extension(home.rpartition('.')[2]))}")
+    return getattr(import_module(module), name)
 
 
 @cache

@@ -246,69 +246,6 @@ def test_a_design_that_is_no_optimum_is_never_called_one() -> None:
     assert proven.certificate.kind is Proof.NONE
 
 
-def test_a_linear_function_of_a_load_is_proven_as_the_load_is() -> None:
-    problem = ready("tractor-four-lanchester")
-    vertical = laufruhe.own_measure("vertical force", load=lambda forces: forces[..., 2:])
-    own = laufruhe.solve(problem.with_objective(vertical))
-    same = laufruhe.solve(problem.minimise(MEAN_FORCE, direction_weights=[0, 0, 1]))
-    assert own.objective is not None
-    assert own.certificate is not None
-    assert same.objective is not None
-    assert own.objective.value == pytest.approx(same.objective.value, rel=1e-9)
-    assert own.certificate.kind is Proof.GLOBAL
-    limited = laufruhe.solve(problem.with_limit(vertical, 0.999 * own.certificate.lower_bound, "vertical"))
-    assert limited.conflict == ("vertical",)
-
-
-@pytest.mark.parametrize(
-    ("function", "message"),
-    [
-        (np.abs, "is not linear"),
-        (lambda forces: forces + 1.0, "is not linear"),
-        (lambda forces: forces.sum(), "keep all three axes"),
-    ],
-)
-def test_a_function_that_is_not_linear_is_no_load(function: Any, message: str) -> None:
-    with pytest.raises(ModelError, match=message):
-        ready("tractor-four-lanchester").with_objective(laufruhe.own_measure("own", load=function))
-
-
-def test_a_function_in_place_of_a_norm_is_only_declared_convex() -> None:
-    problem = ready("twin-parallel-360")
-    load = problem.objective[0].measure.channel.name
-    root = laufruhe.own_measure("root", lambda f: np.sqrt((f**2).sum(axis=-1).mean()), load, curvature="convex")
-    # few starts suffice: the function is the norm of the problem
-    own = laufruhe.solve(problem.with_objective(root).changed(search=Search(starts=1)))
-    same = laufruhe.solve(problem)
-    assert own.objective is not None
-    assert own.certificate is not None
-    assert same.objective is not None
-    assert own.objective.value == pytest.approx(same.objective.value, rel=1e-3)
-    assert own.certificate.kind in (Proof.LOCAL, Proof.NONE)
-    assert own.certificate.lower_bound == 0.0
-    assert "convex as declared, not proven" in own.certificate.method
-
-
-@pytest.mark.parametrize(
-    ("function", "curvature", "error", "message"),
-    [
-        (lambda f: np.median(np.linalg.norm(f, axis=-1)), "convex", InputError, "midway"),
-        (lambda f: np.abs(f).max(), "affine", InputError, "midway"),
-        (lambda f: -1.0, "convex", ModelError, "zero or more"),
-        (lambda f: f, "unknown", ModelError, "return one finite number"),
-        (lambda f: math.nan, "unknown", ModelError, "return one finite number"),
-    ],
-)
-def test_a_function_that_breaks_its_declaration_is_refused(
-    function: Any, curvature: Any, error: type[Exception], message: str
-) -> None:
-    measure = laufruhe.own_measure("own", function, curvature=curvature)
-    with pytest.raises(error, match=message):
-        ready("tractor-four-lanchester").with_objective(measure)
-    with pytest.raises(ModelError, match="no cones"):
-        ready("tractor-four-lanchester").changed(objective=(laufruhe.problem.measure.Term(measure),)).to_cvxpy()
-
-
 def test_the_program_in_casadi_has_the_optimum_of_the_cones() -> None:
     problem = ready("tractor-four-lanchester")
     program = problem.to_casadi()

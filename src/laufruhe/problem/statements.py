@@ -5,10 +5,10 @@ The functions are named by their address, because this room imports no solver.
 
 from __future__ import annotations
 
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Self
 
 from laufruhe.errors import optional_libraries
+from laufruhe.extension import object_at
 from laufruhe.problem.measure import Measure
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ _FUNCTIONS = {
     "objective_function": "laufruhe.load_models.objective_function:objective_function",
     "to_cvxpy": "laufruhe.solvers.cones.cvxpy_program:program_of",
     "to_casadi": "laufruhe.solvers.smooth.statement:smooth_statement",
-    "with_objective": "laufruhe.problem.own_measures:with_objective",
-    "with_limit": "laufruhe.problem.own_measures:with_limit",
+    "with_objective": "laufruhe.extensions.own_measures.measures:with_objective",
+    "with_limit": "laufruhe.extensions.own_measures.measures:with_limit",
 }
 
 
@@ -30,7 +30,7 @@ class Statements:
 
     def _call(self, name: str, *arguments: Any) -> Any:
         with optional_libraries():
-            return resolve_name(_FUNCTIONS[name])(self, *arguments)
+            return object_at(_FUNCTIONS[name])(self, *arguments)
 
     def _repr_html_(self) -> str:
         return str(self._call("html"))
