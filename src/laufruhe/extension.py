@@ -99,10 +99,10 @@ _OF_SIZES = (
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {
-        "balancer sizing": "balance_studies",
-        "counterweight fraction": "balance_studies",
-        "free forces": "balance_studies",
-        "percentile": "balance_studies",
+        "balancer sizing": "sweeps",
+        "counterweight fraction": "sweeps",
+        "free forces": "sweeps",
+        "layout comparison": "sweeps",
         "economics": "economics",
         "random designs": "random_studies",
         "random scenes": "random_studies",

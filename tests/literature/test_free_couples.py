@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe import load
 from laufruhe.errors import ModelError
-from laufruhe.extensions.balance_studies.free_forces import FreeLoad, free_load
+from laufruhe.extensions.sweeps.free_forces import FreeLoad, free_load
 from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.layouts import Layout, build, even_throws, inline, vee
 from laufruhe.physics.fidelity import EXACT, Fidelity

@@ -12,12 +12,12 @@ import pytest
 import xarray as xr
 
 import laufruhe
+from laufruhe.extensions.sweeps.layout_comparison import LayoutComparison, _places
 from laufruhe.files.reader import load_tables
 from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
 from laufruhe.plots.picture import draw
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
-from laufruhe.studies.layout_comparison import LayoutComparison, _places
 from laufruhe.studies.scenes import ProblemFiles
 from one_cylinder import irregularity
 from problem_files import PROBLEMS

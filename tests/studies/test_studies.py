@@ -23,7 +23,8 @@ from laufruhe.cli import app
 from laufruhe.cli import study as cli_study
 from laufruhe.errors import InputError
 from laufruhe.extension import HOMES
-from laufruhe.extensions.balance_studies.balancer_sizing import shaft_groups
+from laufruhe.extensions.sweeps.balancer_sizing import shaft_groups
+from laufruhe.extensions.sweeps.layout_comparison import LayoutComparison
 from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.problem.measure import MEASURES, Limit, Measure
@@ -31,13 +32,12 @@ from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
 from laufruhe.studies import runner
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.layout_comparison import LayoutComparison
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Point, ProblemFiles
+from laufruhe.studies.solved import solve_scene
 from laufruhe.studies.stores import FINISHED_POINTS
-from laufruhe.studies.swept import solve_scene
 from problem_files import PROBLEMS
 
 SPEED = "operating_points.1.mean_piston_speed"
@@ -85,7 +85,7 @@ def test_every_kind_is_computed_and_shown() -> None:
     """A kind says of itself all that is asked of one."""
     homes = HOMES["study_kinds"].items()
     there = {name for name, home in homes if (Path(laufruhe.__file__).parent / "extensions" / home).exists()}
-    assert set(KINDS) == {"layout comparison", *there}
+    assert set(KINDS) == {"percentile", *there}
     for kind in KINDS.values():
         for said in ("points", "answer", "dataset", "table", "picture"):
             assert getattr(kind, said) is not getattr(Part, said)

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.errors import InputError
+from laufruhe.extensions.sweeps.swept import dataset
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at, keys_of
@@ -19,7 +20,7 @@ from laufruhe.studies.equal_power import at_equal_power
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Point, ProblemFiles
-from laufruhe.studies.swept import dataset, solve_scene
+from laufruhe.studies.solved import solve_scene
 from problem_files import PROBLEMS
 
 SPEED = "operating_points.1.mean_piston_speed"

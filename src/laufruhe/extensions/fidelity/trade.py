@@ -33,7 +33,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.many import values_of_columns
-from laufruhe.studies.swept import solve_scene
+from laufruhe.studies.solved import solve_scene
 
 T = TypeVar("T")
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"

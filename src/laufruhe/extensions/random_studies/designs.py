@@ -17,7 +17,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.studies.part import Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles
-from laufruhe.studies.swept import solve_scene
+from laufruhe.studies.solved import solve_scene
 from laufruhe.studies.text import Text, marked_table, number
 
 if TYPE_CHECKING:

@@ -21,8 +21,7 @@ from laufruhe.present import picture as p
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.studies.part import Record
 from laufruhe.studies.scenes import Point, ProblemFiles
-from laufruhe.studies.swept import solve_scene
-from laufruhe.studies.swept_report import NOTHING_OPEN
+from laufruhe.studies.solved import NOTHING_OPEN, solve_scene
 from laufruhe.studies.text import Text, marked_table, number
 
 if TYPE_CHECKING:

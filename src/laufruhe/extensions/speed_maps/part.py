@@ -26,8 +26,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import FINAL, INITIAL, present_name
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles
-from laufruhe.studies.swept import FAILED, decide_scene
-from laufruhe.studies.swept_report import NOTHING_OPEN
+from laufruhe.studies.solved import FAILED, NOTHING_OPEN, decide_scene
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 

@@ -8,12 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from laufruhe.files.rotors import FACTORS
-from laufruhe.files.study_tables import SweepAxis, at
-from laufruhe.present import picture as p
-from laufruhe.studies.scenes import Point, ProblemFiles
-from laufruhe.studies.swept import SweptPart, coordinates, dataset
-from laufruhe.studies.swept_report import (
+from laufruhe.extensions.sweeps.swept import SweptPart, coordinates, dataset
+from laufruhe.extensions.sweeps.swept_report import (
     bars,
     claim_of,
     groups,
@@ -24,6 +20,10 @@ from laufruhe.studies.swept_report import (
     swept_axis,
     swept_names,
 )
+from laufruhe.files.rotors import FACTORS
+from laufruhe.files.study_tables import SweepAxis, at
+from laufruhe.present import picture as p
+from laufruhe.studies.scenes import Point, ProblemFiles
 
 if TYPE_CHECKING:
     import xarray as xr

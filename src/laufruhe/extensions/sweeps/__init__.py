@@ -1,14 +1,14 @@
-"""Studies of what balances an engine: free forces by layout, balance factors, balancer shafts, percentiles of loads."""
+"""Studies of swept numbers and of layouts: comparisons, balance factors, balancer shafts, free forces."""
 
 from laufruhe.extension import Extension
 
-_HERE = "laufruhe.extensions.balance_studies"
+_HERE = "laufruhe.extensions.sweeps"
 EXTENSION = Extension(
-    "balance_studies",
+    "sweeps",
     study_kinds=(
         f"{_HERE}.balancer_sizing:BalancerSizing",
         f"{_HERE}.counterweight_fraction:CounterweightFraction",
         f"{_HERE}.free_forces:FreeForces",
-        f"{_HERE}.percentile:PercentilePart",
+        f"{_HERE}.layout_comparison:LayoutComparison",
     ),
 )

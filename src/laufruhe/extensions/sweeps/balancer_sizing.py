@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from laufruhe.extensions.sweeps.swept import SweptPart
+from laufruhe.extensions.sweeps.swept_report import bars, by_point, over_sweep, swept_names
 from laufruhe.files.study_tables import MAX_POINTS
 from laufruhe.present.picture import Picture
 from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
 from laufruhe.studies.scenes import Point, ProblemFiles, shafts_of
-from laufruhe.studies.swept import SweptPart, solve_scene
-from laufruhe.studies.swept_report import bars, by_point, over_sweep, swept_names
+from laufruhe.studies.solved import solve_scene
 from laufruhe.studies.text import Text
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from laufruhe.present import picture as p
 from laufruhe.present.numbers import number as figures
 from laufruhe.present.numbers import percent
 from laufruhe.present.pictures import rows_of
+from laufruhe.studies.solved import NOTHING_OPEN
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 
@@ -22,8 +23,6 @@ MAX_ROWS, MAX_DOTS = 80, 40
 NEGLIGIBLE = 1e-9
 # width of a tick's letter [inch], and letters per line
 LETTER, LETTERS = 0.078, 18
-NOTHING_OPEN = "nothing open"
-"""Proof of a problem without decisions."""
 _PROOFS = {"global": "proven", "global within gap": "proven within gap", "local": "local", "none": "not proven"}
 
 

@@ -11,6 +11,17 @@ import numpy as np
 from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.sweeps.swept import SweptPart
+from laufruhe.extensions.sweeps.swept_report import (
+    MAX_ROWS,
+    bars,
+    by_point,
+    claim_of,
+    in_words,
+    over_sweep,
+    readable_metric,
+    swept_names,
+)
 from laufruhe.files import fields as f
 from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
@@ -23,18 +34,7 @@ from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
 from laufruhe.studies.scenes import Point, ProblemFiles
-from laufruhe.studies.swept import Further, SweptPart, solve_scene
-from laufruhe.studies.swept_report import (
-    MAX_ROWS,
-    NOTHING_OPEN,
-    bars,
-    by_point,
-    claim_of,
-    in_words,
-    over_sweep,
-    readable_metric,
-    swept_names,
-)
+from laufruhe.studies.solved import NOTHING_OPEN, Further, solve_scene
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 

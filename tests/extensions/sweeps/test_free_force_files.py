@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from laufruhe.extensions.balance_studies.free_forces import count_agreeing
+from laufruhe.extensions.sweeps.free_forces import count_agreeing
 from laufruhe.plots.picture import draw
 from laufruhe.studies.kinds import KINDS
 from problem_files import PROBLEMS
