@@ -103,7 +103,7 @@ class SignalKinks:
         k, degrees = self.jumps.shape[:2]
         flat = self.jumps.reshape(k, degrees, -1)
         size, shares = _shares(count, base, degrees)
-        weighted = (_waves(self.angles * base, count) @ flat.reshape(k, -1)).reshape(count, degrees, -1)
+        weighted = (waves(self.angles * base, count) @ flat.reshape(k, -1)).reshape(count, degrees, -1)
         total = (shares[:, None] @ weighted)[:, 0]
         largest = size @ np.abs(flat).sum(axis=0)
         # sums that a crank star cancels are exactly zero
@@ -267,9 +267,9 @@ def _shares(count: int, base: float, degrees: int) -> tuple[Array, NDArray[np.co
     return size, size * _QUARTERS[np.arange(degrees) % 4]
 
 
-def _waves(angles: Array, count: int) -> NDArray[np.complex128]:
-    # e^{-i j angle} for j = 0 ... count - 1, as products of two exponentials, shape (count, angles)
-    low = np.exp(-1j * np.outer(np.arange(_RUN), angles))
+def waves(angles: Array, count: int) -> NDArray[np.complex128]:
+    """Return e^{-i j angle} for j = 0 ... count - 1 as products of two exponentials, shape (count, angles)."""
+    low = np.exp(-1j * np.outer(np.arange(min(_RUN, count)), angles))
     high = np.exp(-1j * np.outer(np.arange(0, count, _RUN), angles))
     return np.asarray((high[:, None] * low).reshape(-1, len(angles))[:count])
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from laufruhe.numerics.exact_angles import Turn, phasors
-from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, join_kinks, kink_nodes
+from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, join_kinks, kink_nodes, waves
 
 MAX_SIGNAL_KINKS = 24
 """Largest number of kinks of one signal that are kept in closed form; its orders contain all others."""
@@ -149,8 +149,9 @@ class Spectrum:
         """Return the signal at crank angles [rad], shape (len(angles), ...)."""
         smooth = self.smooth.coefficients
         nonzero = np.flatnonzero(smooth.reshape(len(smooth), -1).any(axis=1))
-        waves = np.exp(1j * np.outer(angles, self.orders[nonzero]))
-        values = np.asarray(np.tensordot(waves, smooth[nonzero], axes=(1, 0)).real)
+        step = max(int(np.gcd.reduce(nonzero)), 1)
+        turned = waves(-float(self.base) * step * angles, (nonzero.max(initial=0) + step) // step)
+        values = np.asarray(np.tensordot(turned[nonzero // step], smooth[nonzero], axes=(0, 0)).real)
         return values if self.kinks is None else values + self.kinks.values(angles, self.period)
 
     @property

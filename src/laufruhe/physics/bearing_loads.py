@@ -329,6 +329,6 @@ def wear_of(path: ComplexArray, angles: Array) -> Array:
 
     The path (n,) is the force on the bearing at equal steps of the cycle [N], across the crank axis (C4).
     """
-    distance = np.abs(np.angle(np.exp(1j * (np.angle(path)[:, None] - angles))))
-    total = (np.abs(path)[:, None] * (distance <= SIDES)).sum(axis=0)
+    size = np.abs(path)
+    total = size @ (np.outer(path, np.exp(-1j * angles)).real >= math.cos(SIDES) * size[:, None])
     return np.asarray(total / (total.max() or 1.0))
