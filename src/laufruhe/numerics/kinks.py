@@ -271,7 +271,7 @@ def waves(angles: Array, count: int) -> NDArray[np.complex128]:
     """Return e^{-i j angle} for j = 0 ... count - 1 as products of two exponentials, shape (count, angles)."""
     low = np.exp(-1j * np.outer(np.arange(min(_RUN, count)), angles))
     high = np.exp(-1j * np.outer(np.arange(0, count, _RUN), angles))
-    return np.asarray((high[:, None] * low).reshape(-1, len(angles))[:count])
+    return np.asarray((high[:, None] * low).reshape(len(high) * len(low), len(angles))[:count])
 
 
 @lru_cache(maxsize=1)

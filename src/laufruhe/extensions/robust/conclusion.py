@@ -119,7 +119,7 @@ def robust_result(
     seconds
         Time of the search [s].
     """
-    from scipy.stats import beta
+    from scipy.special import betaincinv
 
     started, worst = time.perf_counter(), robust.worst
     design = evaluate_design(problem, robust.values, robust.samples)
@@ -134,7 +134,7 @@ def robust_result(
     nominal_objectives = engines.objectives(nominal)
     exceeding = int((objectives > worst.bound * (1.0 + 1e-12)).sum())
     # Clopper and Pearson (R10)
-    at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, count - exceeding)) if exceeding < count else 1.0
+    at_most = float(betaincinv(exceeding + 1, count - exceeding, CONFIDENCE)) if exceeding < count else 1.0
     details = RobustResult(
         population=population, exact=population.share is None and tolerances.is_affine, share=share,
         nominal=_design("nominal design", problem, nominal, nominal_worst, nominal_objectives, share),
@@ -173,10 +173,11 @@ def robust_result(
 def _design(
     name: str, problem: Problem, values: Sequence[Value], worst_engines: WorstEngines, objectives: Array, share: float
 ) -> BuiltDesign:
-    from scipy.stats import binom
+    from scipy.special import bdtrik
 
     ordered = np.sort(objectives)
-    low, high = (int(binom.ppf(0.5 + side * 0.5 * CONFIDENCE, len(objectives), share)) for side in (-1.0, 1.0))
+    ends = np.array([0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE])
+    low, high = np.ceil(bdtrik(ends, len(objectives), share)).astype(int)
     pairs = zip(problem.decisions, values, strict=True)
     entries = tuple(
         (entry.name, entry.value, entry.unit) for decision, value in pairs for entry in decision_values(decision, value)
