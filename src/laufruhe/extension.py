@@ -96,6 +96,10 @@ _OF_SIZES = (
     "main-bearing pressure times speed", "share of the buckling load", "piston-pin pressure", "piston-pin deflection",
     "piston-pin bending stress", "piston-pin ovality", "throw clearance", "running-gear mass",
 )  # fmt: skip
+_OF_PISTONS = (
+    "piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle",
+    "side-force reversal rate",
+)  # fmt: skip
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {
@@ -147,6 +151,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "drives": {"swinging-yoke": "swinging_yoke"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")
+    | dict.fromkeys(_OF_PISTONS, "piston_motion")
     | {"parts price": "parts_lists", "electric torque": "electric_torque"},
 }
 """Extensions of this package by the names that they add to tables, for the complaint if one is not installed."""

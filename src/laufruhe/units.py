@@ -192,6 +192,7 @@ _EXAMPLES = {
     "Pa": ("a pressure", "5.5 kp/cm^2"),
     "N": ("a force", "900 N"),
     "N m": ("a moment", "120 N m"),
+    "N/s": ("a rate of force", "2e6 N/s"),
     "J": ("an energy", "432 J"),
     "kg/m^3": ("a density", "7250 kg/m^3"),
     "N/m": ("a stiffness", "300 N/mm"),
@@ -337,6 +338,7 @@ _UNITS = {
     "rad/s": ("rpm", 30.0 / math.pi),
     "m": ("mm", 1e3),
     "N/m": ("N/mm", 1e-3),
+    "N/s": ("kN/s", 1e-3),
     "Pa": ("N/mm^2", 1e-6),
 }
 

@@ -1,0 +1,77 @@
+"""Report section of piston motion: stroke, speeds, accelerations, rod angle and side-force reversals by cylinder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from laufruhe.extensions.piston_motion.channels import RODS, reversals_at
+from laufruhe.extensions.piston_motion.motion import Extreme, PistonMotion, piston_motion, pistons_of
+from laufruhe.machine import SliderCrank
+from laufruhe.physics.bearing_loads import has_bearing_loads
+from laufruhe.present.numbers import number
+from laufruhe.present.tables import Table
+from laufruhe.problem.loads import PointLoads
+from laufruhe.report.section import Section
+from laufruhe.solvers.result import Result
+from laufruhe.units import readable
+
+
+def _has_pistons(result: Result) -> bool:
+    return bool(result.final.loads) and bool(pistons_of(result.final.engine))
+
+
+def _motions(result: Result) -> Iterator[tuple[PointLoads, SliderCrank, PistonMotion, Sequence[Extreme] | None]]:
+    engine = result.final.engine
+    has_side_force = RODS.of(engine) and has_bearing_loads(engine, result.final.fidelity)
+    for loads in result.final.loads:
+        sets = reversals_at(engine, loads) if has_side_force else [None] * len(engine.slider_cranks)
+        for part, reversals in zip(engine.slider_cranks, sets, strict=True):
+            yield loads, part, piston_motion(part, loads.point.speed), reversals
+
+
+def _record(result: Result) -> Mapping[str, Any]:
+    record: dict[str, list[Mapping[str, Any]]] = {}
+    for loads, part, motion, reversals in _motions(result):
+        rates = None if reversals is None else [{"rate": one.value, "angle": one.angle} for one in reversals]
+        record.setdefault(part.name, []).append(
+            {"point": loads.point.name, **asdict(motion), "side_force_reversals": rates}
+        )
+    return record
+
+
+def _tables(result: Result) -> list[Table]:
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for loads, part, motion, reversals in _motions(result):
+        fastest = max(reversals or (), key=lambda reversal: reversal.value, default=None)
+        cells = (
+            loads.point.name, _text(motion.stroke, "m"), _text(motion.mean_speed, "m/s"), _at(motion.speed, "m/s"),
+            _at(motion.towards_crank, "m/s^2"), _at(motion.from_crank, "m/s^2"),
+            _text(motion.rod_angle.value, "rad") if motion.rod_angle else "",
+            "" if reversals is None else str(len(reversals)), _at(fastest, "N/s") if fastest else "",
+        )  # fmt: skip
+        rows.setdefault(cells, []).append(part.name.removeprefix(f"{part.noun} "))
+    texts = [(cells[0], ", ".join(names), *cells[1:]) for cells, names in rows.items()]
+    units = {
+        "stroke": "m", "mean speed": "m/s", "largest speed": "m/s", "acceleration to crank": "m/s^2",
+        "from crank": "m/s^2", "rod angle": "rad", "reversals": "", "fastest reversal": "N/s",
+    }  # fmt: skip
+    head = ("at", "cylinder", *(f"{word} [{readable(unit)[0]}]" if unit else word for word, unit in units.items()))
+    note = (
+        "Final design, at the mean speed of the crank. Angles: own crank after top dead centre. Reversals: how often "
+        "the side force changes its sign in a cycle, and its rate at the fastest reversal, a measure of piston slap."
+    )
+    return [Table(head, texts, title="Motion of the pistons", left=2, note=note, file="piston-motion")]
+
+
+def _text(value: float, unit: str) -> str:
+    return number(value * readable(unit)[1])
+
+
+def _at(extreme: Extreme, unit: str) -> str:
+    return f"{_text(extreme.value, unit)} at {number(math.degrees(extreme.angle), 3, 360.0)} deg"
+
+
+SECTION = Section("piston_motion", _has_pistons, _tables, _record, ("piston-motion",))
