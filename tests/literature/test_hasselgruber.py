@@ -18,6 +18,7 @@ import pytest
 from numpy.typing import NDArray
 
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, Role, Rotor, Shaft
+from laufruhe.machine.firing import firing_turns, intervals_of
 from laufruhe.machine.layouts import Layout, boxer, build, inline, stations, vee
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -115,6 +116,21 @@ class TestFirstOrderShaft:
         """Text below eq. 24: the free force of second order is not touched, 2 m r lambda w^2."""
         left = _loads(self.balanced(Cycle.FOUR_STROKE, (0.0, math.pi), 1.0)).at(2)
         assert abs(left[2]) == pytest.approx(2 * RATIO * FORCE, rel=1e-14)
+
+    @by_kinematics
+    def test_two_cylinder_with_its_shaft_is_as_a_four(self, fidelity: Fidelity) -> None:
+        """Text above the three-cylinder: each order of a four is twice that of a two with its shaft."""
+        two = _loads(self.balanced(Cycle.FOUR_STROKE, (0.0, math.pi), 1.0), fidelity)
+        four = _loads(_engine(inline(4, SPACING), (0.0, math.pi, math.pi, 0.0)), fidelity)
+        for order in range(1, 7):
+            assert 2.0 * two.at(order) == pytest.approx(four.at(order), abs=ROUNDING * FORCE)
+
+    def test_two_cylinder_fires_evenly_as_a_two_stroke_alone(self) -> None:
+        """Text on the two-stroke two: intervals of 180 deg, against 180 and 540 deg of the four-stroke."""
+        layout, throws, order = inline(2, SPACING), (0.0, math.pi), (1, 2)
+        turns = firing_turns(layout, throws, order)
+        assert intervals_of(Cycle.TWO_STROKE, turns) == pytest.approx((math.pi, math.pi))
+        assert sorted(intervals_of(Cycle.FOUR_STROKE, turns)) == pytest.approx([math.pi, 3.0 * math.pi])
 
     def test_second_order_couple_remains_on_the_three_cylinder(self) -> None:
         """Text below eq. 25: a free couple of second order remains, that star's sqrt(3)."""

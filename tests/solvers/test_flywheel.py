@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +100,21 @@ def test_the_least_inertia_has_its_degree_and_is_shown_from_both_sides(tmp_path:
     ]
     slope = (ends[0].objective.value - ends[1].objective.value) / 0.0002
     assert result.limits[0].shadow_price == pytest.approx(slope, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_permitted_degrees_of_the_textbook_need_inertias_in_inverse_proportion(tmp_path: Path) -> None:
+    """Textbook, section 2.7: the table of the how-to page; eq. 25, E = J w^2 delta, exact for small delta."""
+    page = (PROBLEMS.parent / "docs/how-to/flywheel.md").read_text(encoding="utf-8")
+    degrees = re.findall(r"^\| .* \| `(1/\d+)` \|$", page, re.MULTILINE)
+    inertia = changed(INERTIA, "40 kg m^2", "400 kg m^2")
+    products = {
+        degree: proven(loaded(tmp_path, SINGLE + inertia + changed(LEAST, "1/100", degree))).objective.value
+        * float(Fraction(degree))
+        for degree in degrees
+    }
+    assert list(products) == ["1/300", "1/200", "1/150", "1/90", "1/45", "1/25"]
+    assert list(products.values()) == pytest.approx([products["1/300"]] * 6, rel=5e-3)
 
 
 @pytest.mark.slow
