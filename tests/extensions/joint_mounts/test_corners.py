@@ -16,10 +16,9 @@ from extensions.joint_mounts.test_mount_loops import SEEDS, boxes_of, joint
 from lanes import first_fast
 from laufruhe.errors import BoundError
 from laufruhe.extensions.joint_mounts import corner_boxes
-from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, mixes_corners, priced
+from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, best_at, mixes_corners, priced
 from laufruhe.extensions.joint_mounts.mount_loops import mount_loop
 from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
-from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.problem.decision import TURNED
 from laufruhe.prove.certificate import lower_bound, minorant

@@ -14,7 +14,7 @@ import laufruhe
 from claims.test_broken_bounders import INPUTS, first_times, scaled
 from claims.test_unnamed import RESULTANT
 from laufruhe.errors import BoundError
-from laufruhe.extensions.mount_relaxation.cone_solver import new_solver
+from laufruhe.extensions.mount_relaxation.cone_program import new_solver
 from laufruhe.extensions.mount_relaxation.prover import applies, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.numerics.budget import is_time_over, limit_time, minimum_time, seconds_left

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
-from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
-from laufruhe.extensions.mount_relaxation.cone_solver import (
+from laufruhe.extensions.mount_relaxation.cone_program import (
+    ConeProgram,
     ConeSolver,
 )
 from laufruhe.extensions.mount_relaxation.program import RootTerm, SdpProgram

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from laufruhe.extensions.phase_leads.irregularity import LeadSwing
+from laufruhe.extensions.phase_leads.bounds import LeadSwing
 from laufruhe.extensions.phase_leads.model import PhaseLeadModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.norms import NORMS

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from laufruhe.extensions.phase_leads.irregularity import largest_torque
+from laufruhe.extensions.phase_leads.bounds import largest_torque
 from laufruhe.numerics.spectrum import Spectrum
 
 

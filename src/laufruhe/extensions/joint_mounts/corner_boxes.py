@@ -15,27 +15,58 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_loop
-from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, Pairing
-from laufruhe.extensions.joint_mounts.multipliers import best_at
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, Pairing, coarser
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits, corners_of, mixed
-from laufruhe.load_models.affine import FEASIBLE, MAX_NUMBERS
+from laufruhe.load_models.affine import FEASIBLE, MAX_NUMBERS, AffineProblem
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult
-from laufruhe.prove.certificate import Multipliers
+from laufruhe.prove.certificate import Multipliers, best_bound, interpolate_duals, lower_bound
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.subdivision import EVEN, is_stiffness_problem
 from laufruhe.prove.witness import Witness
+from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.equations import refine_multipliers
+
+COARSE_ROWS, MIN_SAMPLES = (1000, 3000), 24
+"""Most rows of coarse programs in the order of trials, and fewest samples."""
+GAP = 1e-5
+"""Relative gap at which multipliers are accepted."""
+
+
+def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
+    """Return optimal unbalances, shape (columns,), and multipliers; if limits contradict, those that prove it (P6)."""
+    zero = (tuple(np.zeros_like(norm.constant) for _, norm in parts) for parts in (problem.terms, problem.limits))
+    x, best = problem.start, lower_bound(problem, Multipliers(*zero))
+    for factor in _coarsenings(problem):
+        coarse = coarser(problem, factor)
+        solution = solve_cones(coarse)
+        if solution.x is None:
+            proof = refine_multipliers(coarse, problem, replace(solution.multipliers, terms=()))
+            return x, replace(best.multipliers, limits=interpolate_duals(problem, proof).limits)
+        x, best = solution.x, best_bound(problem, solution.x, refine_multipliers(coarse, problem, solution.multipliers))
+        if problem.objective(x) - best.value <= GAP * best.value:
+            break
+    return x, best.multipliers
+
+
+def _coarsenings(problem: AffineProblem) -> list[int]:
+    # factors of coarser sampling in the order of trials
+    rows = sum(len(norm.grid.weights) for _, norm in (*problem.terms, *problem.limits))
+    divisors = [k for k in range(1, problem.samples // MIN_SAMPLES + 1) if problem.samples % k == 0] or [1]
+    factors = {min((k for k in divisors if rows <= maximum * k), default=divisors[-1]) for maximum in COARSE_ROWS}
+    return sorted(factors, reverse=True)
+
 
 MAX_OPEN = 5
 """Largest number n of open numbers of mounts: a box has 2^n vertices and 4^n coefficients."""

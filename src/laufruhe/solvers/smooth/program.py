@@ -24,8 +24,14 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.block_loads import FixedCrankLoads, OpenCrankLoads, SymbolicLoads
 from laufruhe.load_models.labelled_rows import column_names
-from laufruhe.load_models.mount_rows import sampled_rows, transmitted_squares
-from laufruhe.load_models.mount_symbols import PointResponse, elimination, response, symbolic_mounts
+from laufruhe.load_models.mount_symbols import (
+    PointResponse,
+    elimination,
+    response,
+    sampled_rows,
+    symbolic_mounts,
+    transmitted_squares,
+)
 from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array

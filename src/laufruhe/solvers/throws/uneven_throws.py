@@ -7,7 +7,7 @@ linear in the angles. The exact model compares both, so the result is never wors
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +17,13 @@ from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import until_time_limit
+from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.progress import report_progress
+from laufruhe.physics.torque import turning_inertia
+from laufruhe.problem.channels import STORED_WORK
 from laufruhe.problem.decision import projected_vector
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import Side, Term
+from laufruhe.problem.measure import Limit, Measure, Side, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
@@ -41,9 +44,58 @@ from laufruhe.solvers.smooth.program import TURN, SmoothProgram
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
-from laufruhe.solvers.throws.stored_work import has_degree, with_work
 from laufruhe.solvers.throws.throw_search import ThrowBound, search_throws
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
+
+
+def has_degree(problem: Problem) -> bool:
+    """Return True if the objective or a limit is a degree of irregularity."""
+    return any(measure.channel.depends_on_torque for measure in problem.measures)
+
+
+def with_work(problem: Problem) -> Problem:
+    """Return the problem with work stored at constant speed in place of degrees of irregularity, for searches (S39).
+
+    Work is a sum over the cylinders like all loads, so that the smooth program can model it.
+    Weights keep the value of each degree in the initial design. An objective term counts the work at the operating
+    point with the largest degree, a limit that at every point.
+    """
+    if not has_degree(problem):
+        return problem
+    initial, inertia = evaluate(problem), turning_inertia(problem.engine, problem.fidelity)
+    speeds = {point.name: point.speed for point in problem.points}
+
+    def degree(measure: Measure, name: str) -> float:
+        value = initial.value(replace(measure, points=(name,)))
+        # if the crank would stop, use the degree of a heavy flywheel with this work
+        heavy = 0.0 if inertia is None else initial.value(_work(name)) / (inertia * speeds[name] ** 2)
+        return value if math.isfinite(value) else heavy
+
+    def slope(measure: Measure, name: str) -> float:
+        return degree(measure, name) / (initial.value(_work(name)) or 1.0)
+
+    terms: list[Term] = []
+    limits: list[Limit] = []
+    for term in problem.objective:
+        if term.measure.channel.depends_on_torque:
+            _, name = max((degree(term.measure, name), name) for name in _points(problem, term.measure))
+            term = Term(_work(name), term.weight * slope(term.measure, name))
+        terms.append(term)
+    for limit in problem.limits:
+        names = _points(problem, limit.measure) if limit.measure.channel.depends_on_torque else ()
+        maxima = [limit.maximum / (slope(limit.measure, name) or 1.0) for name in names]
+        works = [Limit(limit.name, _work(name), maximum) for name, maximum in zip(names, maxima, strict=True)]
+        limits += works or [limit]
+    return replace(problem, objective=tuple(terms), limits=tuple(limits))
+
+
+def _work(name: str) -> Measure:
+    return Measure(STORED_WORK, NORMS["peak to peak"], points=(name,))
+
+
+def _points(problem: Problem, measure: Measure) -> Sequence[str]:
+    return [point.name for point in problem.points if measure.includes_point(point)]
+
 
 # number of start cranks of a thorough search
 STARTS = 6
