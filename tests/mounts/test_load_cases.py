@@ -29,8 +29,8 @@ from laufruhe.prove.mounts.box_numbers import LINEAR_BOUNDS
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.smooth.cases import StaticCases
 from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
+from laufruhe.solvers.smooth.variables import StaticCases
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.powertrain import random_mounting
 from problem_files import PROBLEMS

@@ -15,7 +15,7 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
-from laufruhe.solvers.smooth.modes import ModeVariables
+from laufruhe.solvers.smooth.variables import ModeVariables
 from problem_files import PROBLEMS
 
 

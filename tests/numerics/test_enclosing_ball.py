@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from laufruhe.numerics.enclosing_ball import enclosing_balls
+from laufruhe.numerics.norms.peak_to_peak import enclosing_balls
 
 
 def sets_of(kind: str, d: int) -> np.ndarray:

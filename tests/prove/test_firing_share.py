@@ -13,7 +13,7 @@ import pytest
 from laufruhe.files.reader import load_tables
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.throws.firing_average import firing_bound
+from laufruhe.prove.throws.firing_windows_bound import firing_bound
 from laufruhe.solvers import solve
 from laufruhe.solvers.stars.phasing_solver import even_stars
 from problem_files import PROBLEMS

@@ -140,12 +140,14 @@ def unordered_map(
             for future in wait(pending, seconds, FIRST_COMPLETED).done:
                 number, piece, losses = pending.pop(future)
                 try:
-                    answer = _reported(future.result())
+                    answer, reports = future.result()
                 except (CancelledError, BrokenExecutor, *getattr(executor, "losses", ())) as lost:
                     if losses + 1 >= LOSSES:
                         raise _workers_gone(executor, lost) from None
                     submit(number, piece, losses + 1)
                 else:
+                    for error in reports:
+                        report(error)
                     yield number, answer
             if is_time_over() and pending:
                 if not patient:
@@ -189,12 +191,6 @@ def _answer_of(until: float, work: Callable[[T], A], piece: T) -> tuple[A, list[
     # runs in the worker, which starts no workers of its own and collects contradictions of bounds
     with limit_time(until - time.time()), working_on(SERIAL), collected() as reports:
         return work(piece), reports
-
-
-def _reported(answer: tuple[A, list[BoundError]]) -> A:
-    for error in answer[1]:
-        report(error)
-    return answer[0]
 
 
 def _workers_gone(executor: Executor, error: BaseException) -> WorkersGone:

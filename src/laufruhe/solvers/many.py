@@ -161,7 +161,10 @@ def _measured(problem: Problem, values: ComplexArray, jobs: int) -> tuple[Array,
         np.full((len(values), len(problem.objective) + 2 * len(problem.limits)), math.nan),
         [""] * len(values),
     )
-    shared = _shared_decisions(problem)
+    # decisions in which every measure is affine or constant
+    kinds = {decision.kind for decision in problem.unbalances}
+    affine = problem.fidelity.mounts != "time" and all(is_affine(m.channel, kinds, problem) for m in problem.measures)
+    shared = problem.unbalances if affine else ()
     others = [k for k, decision in enumerate(problem.decisions) if decision not in shared]
     alone: list[int] = []
     for rows in _equal_rows(values[:, others]) if shared else [np.arange(len(values))]:
@@ -187,13 +190,6 @@ def _answers(
         closing(unordered_map(work, parts, executor)) as answers,
     ):
         yield from answers
-
-
-def _shared_decisions(problem: Problem) -> tuple[Decision, ...]:
-    # those in which every measure is affine or constant
-    kinds = {decision.kind for decision in problem.unbalances}
-    affine = problem.fidelity.mounts != "time" and all(is_affine(m.channel, kinds, problem) for m in problem.measures)
-    return problem.unbalances if affine else ()
 
 
 def _equal_rows(values: ComplexArray) -> list[Indices]:

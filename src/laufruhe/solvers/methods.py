@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -22,7 +23,7 @@ from laufruhe.problem.channels import (
 )
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends, open_kinds
-from laufruhe.problem.evaluation import objective_value, with_fine_sampling
+from laufruhe.problem.evaluation import Evaluation, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, PriorityLevel
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -50,8 +51,44 @@ from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
 from laufruhe.solvers.stars.even_search import refuse_long
-from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
 from laufruhe.solvers.walk import check_by_walk
+
+
+def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evaluation) -> tuple[Problem, Evaluation]:
+    """Return the problem without those optional shafts, alone or in pairs, that violate limits on their positions.
+
+    Parameters
+    ----------
+    limits
+        Limits that depend on the choice of shafts alone.
+    initial
+        Evaluation with all shafts.
+
+    Returns
+    -------
+    The problem without these sets of shafts, and the evaluation without any optional shaft. Every design violates the
+    limits that this evaluation violates.
+    """
+    placing = tuple(limit for limit in limits if limit.measure.channel.is_placing)
+    phasing = problem.phasing
+    if phasing is None or not (phasing.shafts.optional and placing):
+        return problem, initial
+
+    def evaluation_with(sets: Sequence[int]) -> Evaluation:
+        left_out = phasing.without(sets)
+        rotors = tuple(rotor for rotor in initial.engine.rotors if rotor.shaft.name not in left_out)
+        return replace(initial, engine=replace(initial.engine, rotors=rotors))
+
+    clashes: list[tuple[int, ...]] = []
+    # a distance involves one shaft or two
+    for count in (1, 2):
+        for sets in itertools.combinations(range(len(phasing.shafts.optional)), count):
+            is_known = any(set(clash) <= set(sets) for clash in clashes)
+            if not is_known and violated_limits(placing, evaluation_with(sets)):
+                clashes.append(sets)
+    shafts = replace(phasing.shafts, clashes=tuple(clashes))
+    return replace(problem, phasing=replace(phasing, shafts=shafts)), evaluation_with(())
+
 
 TIME_LIMIT_NOTE = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
@@ -73,10 +110,6 @@ def solve_with_places(problem: Problem) -> Result:
     method = _method(without_places(problem))
     # `Method.solve` refines the fidelity, so the inner solver does not
     return solve_places_with(problem, method.solver, method.name, solve_all_numbers)
-
-
-def _closes_without_places(problem: Problem) -> bool:
-    return Kind.PLACE in open_kinds(problem) and _method(without_places(problem)).strength is ProofStrength.EXACT
 
 
 def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
@@ -177,7 +210,8 @@ _CORE: tuple[Method, ...] = (
         ProofStrength.EXACT, solve_with_places,
         refines_fidelity=True,
         known_channels=OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
-        accepts_problem=_closes_without_places,
+        accepts_problem=lambda problem: Kind.PLACE in open_kinds(problem)
+        and _method(without_places(problem)).strength is ProofStrength.EXACT,
         proves="what is proven of the rest with places at the corners of their bounds (P20)",
     ),
     Method(

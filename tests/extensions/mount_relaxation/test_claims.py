@@ -19,6 +19,7 @@ from laufruhe.extensions.mount_relaxation.prover import applies, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.numerics.budget import is_time_over, limit_time, minimum_time, seconds_left
 from laufruhe.problem.evaluation import evaluate, objective_value, with_default_sampling
+from laufruhe.prove.mounts.provers import Question
 from problem_files import PROBLEMS
 
 LEAST_STIFF, STIFFEST = 24.108448, 35.101221
@@ -59,7 +60,7 @@ def test_no_bound_counts_what_it_does_not_name() -> None:
     (term,) = problem.objective
     unknown = problem.changed(objective=(replace(term, measure=replace(term.measure, channel=RESULTANT)),))
     assert not applies(unknown)
-    assert spring_bound(unknown, 50.0, 0.01, problem.start).bound == 0.0
+    assert spring_bound(Question(unknown, 50.0, 0.01, problem.start)).bound == 0.0
 
 
 def test_a_relaxation_stops_when_time_is_over_unless_it_is_given_more() -> None:

@@ -18,6 +18,7 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.dual_cones import column, in_dual_cones
+from laufruhe.prove.mounts.provers import Question
 
 DECOUPLED = {"limit": "kinetic-energy decoupling", "motions": ["bounce", "roll"], "min": "0.5"}
 
@@ -154,7 +155,7 @@ def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly(
         if value <= 1.02 * minimum:
             assert np.all((found[0][:4] <= x) & (x <= found[1][:4]))
     assert np.prod((found[1] - found[0])[:4] / (boxes.upper - boxes.lower)[:4]) < 0.5
-    assert 0.0 < spring_bound(problem, minimum, 0.1 * minimum, best.tolist()).bound <= minimum
+    assert 0.0 < spring_bound(Question(problem, minimum, 0.1 * minimum, best.tolist())).bound <= minimum
 
 
 @pytest.mark.parametrize("seed", range(3))

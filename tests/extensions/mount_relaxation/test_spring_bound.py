@@ -30,6 +30,7 @@ from laufruhe.problem.decision import TURNED as ANGLES
 from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.provers import Question
 from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.solvers import solve
@@ -487,8 +488,8 @@ def test_orders_that_nothing_excites_have_no_bound(norm: str, tmp_path: Path) ->
     """Alone they are nothing; beside others they add nothing."""
     silent = f'minimise = "{norm} mount force"\norders = [3]\noperating_points = ["idle"]'
     problem = asked_for(tmp_path, silent)
-    assert spring_bound(problem, 0.0, 0.0, problem.start).bound == 0.0
-    assert spring_bound(problem, 1.0, 1e-4, problem.start).bound == 0.0
+    assert spring_bound(Question(problem, 0.0, 0.0, problem.start)).bound == 0.0
+    assert spring_bound(Question(problem, 1.0, 1e-4, problem.start)).bound == 0.0
 
 
 def powertrain(orders: str, frequency: str, opened: int) -> dict[str, Any]:
@@ -519,7 +520,7 @@ def test_four_springs_are_proven_in_a_few_boxes() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     value = result.objective.value
     near = [decision.value for decision in result.decisions]
-    few = spring_bound(problem, value, 1e-4 * value, near)
+    few = spring_bound(Question(problem, value, 1e-4 * value, near))
     assert 0 < few.boxes < 40
     many = divided_bound(replace(problem, search=replace(problem.search, boxes=400)), value, 1e-4 * value)
     assert many.bound < 0.9 * value < 0.999 * value < few.bound <= value
@@ -551,7 +552,7 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective is not None
     few, value = replace(problem, search=replace(problem.search, boxes=4)), result.objective.value
-    asked = spring_bound(few, 1.1 * value, 1e-3 * value, [decision.value for decision in result.decisions])
+    asked = spring_bound(Question(few, 1.1 * value, 1e-3 * value, [decision.value for decision in result.decisions]))
     assert 0.999 * value < asked.bound <= min(value, minimum) * (1.0 + 1e-9)
 
 

@@ -29,12 +29,10 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult
 from laufruhe.prove.certificate import Multipliers, best_bound, interpolate_duals, lower_bound
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.subdivision import EVEN, is_stiffness_problem
-from laufruhe.prove.witness import Witness
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 
@@ -48,7 +46,10 @@ def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
     """Return optimal unbalances, shape (columns,), and multipliers; if limits contradict, those that prove it (P6)."""
     zero = (tuple(np.zeros_like(norm.constant) for _, norm in parts) for parts in (problem.terms, problem.limits))
     x, best = problem.start, lower_bound(problem, Multipliers(*zero))
-    for factor in _coarsenings(problem):
+    rows = sum(len(norm.grid.weights) for _, norm in (*problem.terms, *problem.limits))
+    divisors = [k for k in range(1, problem.samples // MIN_SAMPLES + 1) if problem.samples % k == 0] or [1]
+    factors = {min((k for k in divisors if rows <= maximum * k), default=divisors[-1]) for maximum in COARSE_ROWS}
+    for factor in sorted(factors, reverse=True):
         coarse = coarser(problem, factor)
         solution = solve_cones(coarse)
         if solution.x is None:
@@ -58,14 +59,6 @@ def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
         if problem.objective(x) - best.value <= GAP * best.value:
             break
     return x, best.multipliers
-
-
-def _coarsenings(problem: AffineProblem) -> list[int]:
-    # factors of coarser sampling in the order of trials
-    rows = sum(len(norm.grid.weights) for _, norm in (*problem.terms, *problem.limits))
-    divisors = [k for k in range(1, problem.samples // MIN_SAMPLES + 1) if problem.samples % k == 0] or [1]
-    factors = {min((k for k in divisors if rows <= maximum * k), default=divisors[-1]) for maximum in COARSE_ROWS}
-    return sorted(factors, reverse=True)
 
 
 MAX_OPEN = 5
@@ -351,29 +344,6 @@ def _concavity(values: Array) -> Array:
         chord = values_of_side[..., :1] * (1.0 - shares) + values_of_side[..., -1:] * shares
         distances.append(float((chord - values_of_side).max()))
     return np.array(distances)
-
-
-def designed_bound(boxes: DesignBoxes, gap_tolerance: float, witness: Witness | None = None) -> BoxResult:
-    """Return the lower bound of the objective by boxes of mounts, for a problem that `mixes_corners`.
-
-    The search ends at the gap tolerance or at the largest number of boxes.
-    """
-
-    class Branching(BatchBisection):
-        """Branch and bound with designs at vertices as incumbents."""
-
-        def propose(self, _: Box) -> None:
-            """Lower the objective of the incumbent to that of the best vertex."""
-            self.value = min(self.value, boxes.value)
-
-    branching = Branching(boxes, boxes.value, gap_tolerance, witness)
-    maximum = boxes.max_boxes
-    if not maximum:
-        return BoxResult(0.0, 0)
-    result = branching.run(branching.bound_boxes([(boxes.lower, boxes.upper)])[0], maximum)
-    if witness is not None:
-        branching.check_near(boxes.lower, boxes.upper, witness)
-    return result
 
 
 def priced(values: Array, violations: list[Array]) -> Array:

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, designed_bound, mixes_corners
+from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, mixes_corners
 from laufruhe.extensions.joint_mounts.load_boxes import is_boxed, load_bounds
 from laufruhe.extensions.joint_mounts.open_throws import throws_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import decision_vector, domains_of
-from laufruhe.prove.branch_and_bound import BoxResult
+from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.prove.witness import Witness
@@ -41,7 +41,20 @@ def bounds_from_corners(question: Question) -> Iterator[BoxResult]:
         return design.value - sampling_overestimate(problem, design.evaluation)
 
     boxes = DesignBoxes(problem, question.value, objective_at)
-    result = designed_bound(boxes, question.gap_tolerance, question.witness)
+
+    class Branching(BatchBisection):
+        """Branch and bound with designs at vertices as incumbents."""
+
+        def propose(self, _: Box) -> None:
+            """Lower the objective of the incumbent to that of the best vertex."""
+            self.value = min(self.value, boxes.value)
+
+    branching, maximum = Branching(boxes, boxes.value, question.gap_tolerance, question.witness), boxes.max_boxes
+    if not maximum:
+        return
+    result = branching.run(branching.bound_boxes([(boxes.lower, boxes.upper)])[0], maximum)
+    if question.witness is not None:
+        branching.check_near(boxes.lower, boxes.upper, question.witness)
     question.value = boxes.value
     yield replace(result, places=() if boxes.best is None else (np.concatenate(boxes.best),))
 

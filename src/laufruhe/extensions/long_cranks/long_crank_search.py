@@ -20,7 +20,7 @@ from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
-from laufruhe.prove.throws.firing_average import firing_bound
+from laufruhe.prove.throws.firing_windows_bound import firing_bound
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.even_search import (

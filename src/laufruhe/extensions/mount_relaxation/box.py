@@ -26,7 +26,7 @@ from laufruhe.extensions.mount_relaxation.program import (
     SdpProgram,
 )
 from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, squared
-from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.arrays import Array
 
 if TYPE_CHECKING:
     from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
@@ -94,7 +94,8 @@ class BoxRelaxation:
             return max(root, 0.0), scores
         self.roots = root_bounds.copy()
         units = np.array([variable.unit for variable in variables])
-        for k in np.flatnonzero(_matters(units * [variable.share for variable in variables])).tolist():
+        sizes = units * [variable.share for variable in variables]
+        for k in np.flatnonzero(sizes > SMALL * sizes.sum()).tolist():
             squared_root = self._solve([variables[k]], np.ones(1))[0]
             self.roots[k] = max(self.roots[k], units[k] * math.sqrt(max(squared_root, 0.0)))
         result = self._bound_mean(variables, self.roots)
@@ -256,7 +257,3 @@ def joint_scores(scores: Array, multiple_scores: Array, missing_bound: float) ->
     """
     unit = max(WORTH * missing_bound, 1e-100 * float(multiple_scores.max()), 1e-300)
     return np.maximum(scores / max(float(scores.max()), 1e-300), multiple_scores / unit)
-
-
-def _matters(sizes: Array) -> Mask:
-    return np.asarray(sizes > SMALL * sizes.sum())

@@ -17,7 +17,6 @@ from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.witness import EXCESS
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import (
     GAP_SAFETY,
     BoundedParts,
@@ -66,15 +65,7 @@ def bounds(question: Question) -> Iterator[BoxResult]:
     """
     stiffness_alone = is_stiffness_problem(question.problem)
     for root_only in (True, False) if stiffness_alone else (False,):
-        result = spring_bound(
-            question.problem,
-            question.value,
-            question.gap_tolerance,
-            question.good_values,
-            question.in_batch,
-            root_only,
-            question.witness,
-        )
+        result = spring_bound(question, root_only)
         if not result.boxes:
             return
         yield result if stiffness_alone else replace(result, places=())
@@ -83,34 +74,17 @@ def bounds(question: Question) -> Iterator[BoxResult]:
 SPRINGS = Prover("boxes of mounts and modes, by spring forces", applies, bounds, "boxes of stiffness")
 
 
-def spring_bound(
-    problem: Problem, value: float, gap_tolerance: float, reference: Sequence[Value], in_batch: bool = False,
-    root_only: bool = False, witness: Witness | None = None,
-) -> BoxResult:  # fmt: skip
+def spring_bound(question: Question, root_only: bool = False) -> BoxResult:
     """Return a lower bound of the objective by branch and bound with semidefinite relaxations.
 
-    The search ends at the gap tolerance or at the largest number of relaxations.
-
-    Parameters
-    ----------
-    value
-        Objective of the best design known [SI]; without a positive finite value the bound is 0.
-    gap_tolerance
-        Absolute difference of objectives that counts as none [SI].
-    reference
-        Values of the decisions of a good design, which sets the units of the relaxation.
-    in_batch
-        True if the bounds of several problems count together: a slightly weaker bound comes first.
-    root_only
-        True to bound the root box alone.
-    witness
-        The best design, as a witness that no bound may exceed.
+    The search ends at the gap tolerance or at the largest number of relaxations, and after the root box if `root_only`.
+    Without a positive finite objective of an incumbent the bound is 0. The good design sets the units of a relaxation.
     """
-    problem = named_part(problem)
+    problem, value, gap_tolerance = named_part(question.problem), question.value, question.gap_tolerance
     if not is_bounded(problem) or not 0.0 < value < math.inf:
         return BoxResult(0.0, 0)
     try:
-        relaxation = SdpRelaxation(with_default_sampling(problem), value, gap_tolerance, reference)
+        relaxation = SdpRelaxation(with_default_sampling(problem), value, gap_tolerance, question.good_values)
         if not relaxation.max_boxes or not relaxation.is_sampled_fully:
             return BoxResult(0.0, 0)
         # prove the tolerance at once, unless a box bounds little of the value
@@ -120,9 +94,9 @@ def spring_bound(
         elif relaxation.has_loose_mean:
             shares, maximum = (*FIRST, *LEVELS), FEW_RELAXED
         else:
-            shares, maximum = (IN_BATCH, 0.0) if in_batch else (0.0,), relaxation.max_boxes
+            shares, maximum = (IN_BATCH, 0.0) if question.in_batch else (0.0,), relaxation.max_boxes
         maximum = 1 if root_only else problem.search.boxes_or(maximum)
-        return _prove_levels(relaxation, gap_tolerance, shares, maximum, witness)
+        return _prove_levels(relaxation, gap_tolerance, shares, maximum, question.witness)
     except np.linalg.LinAlgError:
         # the middle of a box stands on an undamped resonance
         return BoxResult(0.0, 0)

@@ -29,7 +29,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, bisect_box, halves
 from laufruhe.prove.certificate import Multipliers, ProofStrength, best_bound
 from laufruhe.prove.witness import thin_box
-from laufruhe.solvers.boxes.box_designs import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
+from laufruhe.solvers.boxes.search import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     Design,
@@ -107,7 +107,7 @@ class LeadSearch(RebalancedSearch[_Box]):
             return INFEASIBLE_PART
         side = int(np.argmax(result.pull + 1e-12 * half))
         bound, room = max(result.value, floor), EXACT * self.problem.tolerance * result.at_middle
-        return _Box(lower, upper, bound, result.at_middle - bound <= room < math.inf, result.at_middle, side)
+        return _Box(bound, result.at_middle - bound <= room < math.inf, lower, upper, result.at_middle, side)
 
     def _bound(self, middle: Array, half: Array, factor: int) -> LeadBound:
         fine, norms = self.model.at(middle, self.samples, averaged=True)
@@ -150,7 +150,7 @@ class LeadSearch(RebalancedSearch[_Box]):
 
     def around(self, design: RebalancedDesign) -> _Box | FathomedPart:
         """Return a thin box around the leads of a design, with its bound."""
-        return self.box(*thin_box(self.place(design), self.model.lower, self.model.upper), 0.0, design.value)
+        return self.box(*thin_box(self.place(design), self.model.lower, self.model.upper), 0.0, self.value)
 
     def check_acts(self) -> None:
         """Raise ModelError if an open lead angle changes neither the objective nor a limit."""
@@ -179,7 +179,7 @@ class LeadSearch(RebalancedSearch[_Box]):
         else:
             ends = _search_from_grid(self._penalised, self.model.lower, self.model.upper, *GRID)
             designs += [RebalancedDesign(evaluate_design(self.problem, end.tolist())) for end in ends]
-        return min(designs, key=lambda design: design.rank)
+        return min(designs, key=self.rank)
 
     def rebalance_at(self, leads: Array) -> RebalancedDesign:
         """Return the best design with these lead angles [rad], shape (leads,): its unbalances are optimal."""

@@ -20,7 +20,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Multipliers, ProofStrength
-from laufruhe.solvers.boxes.box_designs import rebalance
+from laufruhe.solvers.boxes.search import rebalance
 from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, smallest_conflict, witness_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.result import Result

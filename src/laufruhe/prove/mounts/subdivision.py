@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult, bisect_in_stages
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import LinearBound, is_ratio, lower_bound_of_norm, ratio_under
+from laufruhe.prove.mounts.box_norms import is_ratio, lower_bound_of_norm, ratio_under
 from laufruhe.prove.mounts.box_numbers import BOUNDED_LINEARLY, LINEAR_BOUNDS, RANGES, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.named import named_part
@@ -75,19 +75,6 @@ def stiffness_bounds(
     yield from bisect_in_stages(search, *ends, value, gap_tolerance, search.max_boxes, shares, witness)
 
 
-class SimulatedBoxes(Protocol):
-    """Bounds of simulated measures over boxes of stiffness."""
-
-    measures: tuple[Measure, ...]
-
-    @property
-    def cost(self) -> int:
-        """Work of one box, in numbers."""
-
-    def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None, /) -> LinearBound:
-        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or on those in `mask` only."""
-
-
 class StiffnessBoxes:
     """Lower bounds of objective and limits over boxes of stiffness.
 
@@ -96,7 +83,7 @@ class StiffnessBoxes:
     constant
         Sum of the terms that do not depend on the mounts: loads of the block and masses [SI].
     simulated
-        Bounds of simulated measures, or None.
+        Bounds of simulated measures with `measures`, `cost` and `under(measure, lower, upper, mask)`, or None.
 
     Parameters
     ----------
@@ -130,7 +117,7 @@ class StiffnessBoxes:
             loaded_orders = self.model.loaded_orders(counted)
             self._ratios[measure] = loaded_orders.subset(loaded_orders.omegas > 0.0)
         measures = simulated_measures(problem)
-        self.simulated: SimulatedBoxes | None = (
+        self.simulated: Any = (
             call_by_name(f"{measures[0].channel.simulation}:boxes", self.model, measures) if measures else None
         )
 

@@ -19,8 +19,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, halves
 from laufruhe.prove.witness import thin_box
-from laufruhe.solvers.boxes.box_designs import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.place_boxes import Relaxation
+from laufruhe.solvers.boxes.search import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.conclusion import Design, evaluate_design, infeasible_result, values_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
@@ -129,10 +129,10 @@ class PlaceSearch(RebalancedSearch[_Box]):
 
         A box without a feasible design is an `INFEASIBLE_PART`.
         """
-        violated = self._violated(lower, upper)
-        if violated:
-            self.add_conflict(violated)
-            return INFEASIBLE_PART
+        for limit, minimum, maximum in self._spans(lower, upper):
+            if minimum > limit.maximum + DISTANCE_TOLERANCE or maximum < limit.minimum - DISTANCE_TOLERANCE:
+                self.add_conflict([limit.name])
+                return INFEASIBLE_PART
         relaxed = self.relaxation.program(lower, upper)
         result = self._solve(relaxed)
         if result.status is Status.INFEASIBLE:
@@ -145,7 +145,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         shift = upper - lower if feasible is None else np.abs(feasible - middle)
         spread, middle = np.maximum(spread, shift), middle if feasible is None else feasible
         start, is_exact = self.relaxation.values(relaxed, result, middle), bool(spread.max() <= EXACT_SPREAD)
-        return _Box(lower, upper, max(bound, floor), is_exact, middle, spread, start)
+        return _Box(max(bound, floor), is_exact, lower, upper, middle, spread, start)
 
     def place(self, design: RebalancedDesign) -> Array:
         """Return the positions of a design [m], shape (places,)."""
@@ -172,12 +172,6 @@ class PlaceSearch(RebalancedSearch[_Box]):
         for limit in self._envelope:
             for minimum, maximum in limit.measure.channel.span(limit.measure, low, high):
                 yield limit, minimum, maximum
-
-    def _violated(self, lower: Array, upper: Array) -> tuple[str, ...]:
-        for limit, minimum, maximum in self._spans(lower, upper):
-            if minimum > limit.maximum + DISTANCE_TOLERANCE or maximum < limit.minimum - DISTANCE_TOLERANCE:
-                return (limit.name,)
-        return ()
 
     def _move_into_limits(self, middle: Array, lower: Array, upper: Array) -> Array | None:
         """Return positions in a box close to `middle` that keep the limits on distances [m], or None."""

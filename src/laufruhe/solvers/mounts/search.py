@@ -175,17 +175,15 @@ class MountSearch:
         optimum = self.best.optimum if self.best is not None else None
         return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
 
-    @property
-    def _is_feasible(self) -> bool:
-        return self.best is not None and self.best.design.violation <= SLACK
-
     def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
         joint, generator = self.joint, np.random.default_rng(self.problem.search.seed)
         starts = [
             joint.start(mounts, columns, self._perturbed_throws(generator, k))
             for k, (mounts, columns) in enumerate(points)
         ]
-        self._evaluate_optima(self._solve(starts, self._is_explored))
+        self._evaluate_optima(
+            self._solve(starts, lambda optima: is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12)))
+        )
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
         return SmoothProgram(self.problem, self._size, margin, self.moves, coarser=self._coarser)
@@ -197,14 +195,12 @@ class MountSearch:
     def _solve(self, starts: Sequence[Array], stop_when: StopWhen | None = None) -> tuple[LocalOptimum, ...]:
         return solve_nonlinear(self.joint.program, starts, self._workers, self._iterations, stop_when=stop_when)
 
-    def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
-        return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
-
     def _evaluate_optima(self, optima: Sequence[LocalOptimum]) -> None:
         """Evaluate local optima by the exact model, whatever status the solver reports."""
         self.optima += tuple(optima)
         for k, optimum in enumerate(optima):
-            best = self.best.design.value if self.best is not None and self._is_feasible else np.inf
+            is_feasible = self.best is not None and self.best.design.violation <= SLACK
+            best = self.best.design.value if self.best is not None and is_feasible else np.inf
             report_progress("evaluated local optima", k, len(optima), best)
             design = self._evaluate_optimum(optimum, self.joint)
             if design is not None:

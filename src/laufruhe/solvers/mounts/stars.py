@@ -43,7 +43,7 @@ from laufruhe.solvers.stars.ranking import RankedStar, distinct_orders, ranked_s
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, with_star
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
-# number of the best crank stars that are solved again from all starts
+# number of the best crank stars whose throws are moved
 MAX_SEARCHED = 3
 # starts of a crank star, in addition to the mounts of the first star of the ranking
 FEW_STARTS = 2
@@ -82,7 +82,7 @@ def solve_star_mounts(problem: Problem) -> Result:
     # searches and bounds share workers, because starting these takes as long as solving a star
     with executor_for() as executor, working_on(executor):
         solved = _solve_with_few_starts(problem, phasing, stars)
-        solved = _with_bounds(_solve_best_again(problem, solved), phasing, design_count)
+        solved = _with_bounds(solved, phasing, design_count)
         if phasing.continuous:
             solved = sorted([*solved, *_solve_moved_throws(problem, phasing, solved)], key=_rank)
     timing = {"rank": rank_time - started, "solve": time.perf_counter() - rank_time}
@@ -161,24 +161,6 @@ def _solve_with_few_starts(problem: Problem, phasing: Phasing, stars: list[Star]
         results += ordered_map(work, problems[1:], "stars on their mounts") if not is_time_over() else []
     designs = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
     return sorted(designs, key=_rank)
-
-
-def _solve_best_again(problem: Problem, designs: list[StarDesign]) -> list[StarDesign]:
-    """Return the designs with the best few crank stars solved again from all starts."""
-    improved = list(designs)
-    starts = problem.search.starts
-    for k, design in enumerate(() if is_time_over() else designs[:MAX_SEARCHED]):
-        star_problem = design.result.problem
-        # a star proven no better than the best needs no more starts
-        if star_problem.search.starts >= starts or design.bound >= designs[0].value * (1.0 - problem.tolerance):
-            continue
-        total = min(len(designs), MAX_SEARCHED)
-        report_progress("best stars once more", k, total, value=_minimum_value(improved))
-        with_all_starts = replace(star_problem, search=replace(star_problem.search, starts=starts))
-        with search_scope(f"best star {k + 1} of {total}"):
-            candidate = replace(design, result=solve_mounts(with_all_starts, defer_bounds=True))
-        improved[k] = min(candidate, design, key=_rank)
-    return sorted(improved, key=_rank)
 
 
 def _with_bounds(designs: list[StarDesign], phasing: Phasing, design_count: int) -> list[StarDesign]:

@@ -55,10 +55,6 @@ def design_at_start(problem: Problem, start: tuple[list[float], Array]) -> Desig
     return evaluate_design_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])
 
 
-def _candidates(problem: Problem) -> int:
-    return POOL * (_most_starts(problem) + 1) * (SIMULATED_POOL if simulated_measures(problem) else 1)
-
-
 def _most_starts(problem: Problem) -> int:
     width = len(problem.mount_decisions) + sum(domain.width for domain in domains_of(problem.unbalances))
     return min(problem.search.starts, STARTS * width)
@@ -125,7 +121,8 @@ def _spread_over(problem: Problem) -> Array:
     low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
     scales = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
     ends = np.concatenate([low_log, -scales]), np.concatenate([high_log, scales])
-    points, n = spread_starts(*ends, _candidates(problem), problem.search.seed), len(low)
+    count = POOL * (_most_starts(problem) + 1) * (SIMULATED_POOL if simulated_measures(problem) else 1)
+    points, n = spread_starts(*ends, count, problem.search.seed), len(low)
     points[:, :n] = np.where(ratio, np.exp(np.where(ratio, points[:, :n], 0.0)), points[:, :n])
     points[:, :n] = np.clip(points[:, :n], low, high)
     return points

@@ -49,12 +49,10 @@ from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.prices import Price
-from laufruhe.solvers.smooth.cases import StaticCases
 from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum
-from laufruhe.solvers.smooth.modes import ModeVariables
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram
-from laufruhe.solvers.smooth.simulated import SimulatedVariables
+from laufruhe.solvers.smooth.variables import ModeVariables, SimulatedVariables, StaticCases
 
 # softening of norms relative to their unit: in the first stages, and in the last one (N4)
 SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7

@@ -21,7 +21,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
-from laufruhe.prove.throws.firing_average import firing_bound
+from laufruhe.prove.throws.firing_windows_bound import firing_bound
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import quote_names, refine_result, violated_limits, with_constant_limits
 from laufruhe.solvers.result import Result, Status

@@ -25,7 +25,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.prove.witness import Witness, thin_box
-from laufruhe.solvers.boxes.search import BoxSearch
+from laufruhe.solvers.boxes.search import BoxSearch, SearchPart
 from laufruhe.solvers.conclusion import FEASIBLE, is_sampled, refine_objective
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import ranked_orders
@@ -161,30 +161,12 @@ def peak_error(measure: Measure, best: Result, samples: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _Part(SearchPart):
     """A box with the stage of its bound, and the optional shafts that are not built; the root has no box."""
 
-    bound: float
     box: ThrowBox | None = None
     stage: Stage | None = None
     left_out: tuple[str, ...] = ()
-
-    @property
-    def is_exact(self) -> bool:
-        return self.box is not None and self.box.is_exact
-
-
-@dataclass(frozen=True, eq=False)
-class _Best:
-    design: StarDesign | None
-
-    @property
-    def value(self) -> float:
-        return math.inf if self.design is None else self.design.value
-
-    @property
-    def rank(self) -> tuple[bool, float]:
-        return self.design is None, self.value
 
 
 def search_throws(
@@ -222,11 +204,11 @@ def search_throws(
     except ModelError:
         return None
     maximum = len(search.roots) + problem.search.boxes_or(MAX_BOXES)
-    incumbent, bound, boxes = search.search(_Part(floor), _Best(best), zero_level, search.gap_target, maximum)
-    return ThrowBound(bound, incumbent.design, boxes, search.conflict, search.what)
+    incumbent, bound, boxes = search.search(_Part(floor, False), best, zero_level, search.gap_target, maximum)
+    return ThrowBound(bound, incumbent, boxes, search.conflict, search.what)
 
 
-class ThrowSearch(BoxSearch[_Part, _Best]):
+class ThrowSearch(BoxSearch[_Part, StarDesign]):
     """Branch and bound search over firing windows and boxes of throws."""
 
     def __init__(
@@ -235,7 +217,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
     ) -> None:  # fmt: skip
         self._problem, self._phasing, self._improve = problem, phasing, improve
         self._box_count = self._search_count = self._evaluation_count = 0
-        self._best, self._violated = _Best(best), set[str]()
+        self._best, self._violated = best, set[str]()
         self.what = "boxes of throws" + (" and angles" if any(phasing.is_geometry_open) else "")
         throws = phasing.layout(*phasing.minimum_geometry).throw_positions
         is_one_angle = sum(phasing.is_geometry_open) == 1 and len(throws) == 1 and phasing.throw_bounds is None
@@ -331,10 +313,13 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
     def _level_below(self, value: float) -> float:
         return value * (1.0 - SHARE * self._problem.tolerance)
 
-    def witness_of(self, incumbent: _Best) -> Witness | None:
-        """Return the best design as a witness, a value that no bound may exceed; None without a feasible design."""
-        best = incumbent.design
-        if best is None or best.result.final.violation(best.result.problem.limits) > FEASIBLE:
+    def rank(self, design: StarDesign) -> tuple[bool, float]:
+        """Return the sort key of a design."""
+        return False, design.value
+
+    def witness_of(self, best: StarDesign) -> Witness | None:
+        """Return the best design as a witness, a value that no bound may exceed; None if it violates limits."""
+        if best.result.final.violation(best.result.problem.limits) > FEASIBLE:
             return None
         return Witness(np.array(best.candidate.throws), best.value, lambda: self._highest_objective(best))
 
@@ -343,20 +328,20 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         _, value, value_error = refine_objective(result.problem, result.final, best.value, math.inf, zero_level)
         return value + value_error + zero_level
 
-    def around(self, incumbent: _Best) -> _Part | FathomedPart | None:
+    def around(self, best: StarDesign) -> _Part | FathomedPart | None:
         """Return a thin box of throws around a design, with its bound; None if no window contains the design."""
-        best, stage = incumbent.design, self._finest
-        if best is None or stage is None:
+        stage = self._finest
+        if stage is None:
             return None
         for _, window, left_out in self.roots:
             place = place_in(self._phasing, window, best.candidate)
             if left_out == best.candidate.left_out and place is not None:
                 programs, maximum = stage.programs, self._highest_objective(best) * (1.0 + EXCESS)
                 box = programs.box(programs.program(window), *thin_box(place, *window.box), 0.0, maximum)
-                return box if isinstance(box, FathomedPart) else _Part(box.bound, box, stage, left_out)
+                return box if isinstance(box, FathomedPart) else _Part(box.bound, box.is_exact, box, stage, left_out)
         return None
 
-    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | FathomedPart, _Best | None]]:
+    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | FathomedPart, StarDesign | None]]:
         """Yield the parts of a search node, each with a better design if one was computed.
 
         The parts are the boxes of all firing windows for the root, else the box at more samples, or its halves.
@@ -364,7 +349,8 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         box, stage, cutoff = part.box, part.stage, self._level_below(value)
         if box is None or stage is None:
             for first, window, left_out in self.roots:
-                programs, cutoff = first.programs, self._level_below(min(value, self._best.value))
+                value = value if self._best is None else min(value, self._best.value)
+                programs, cutoff = first.programs, self._level_below(value)
                 root = programs.box(programs.program(window), *window.box, part.bound, cutoff, reuse_multipliers=True)
                 yield self._examine(first, root, left_out)
         elif stage.is_exhausted(part.bound, value, box) and stage.finer is not None:
@@ -377,7 +363,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
 
     def _examine(
         self, stage: Stage, box: ThrowBox | FathomedPart, left_out: tuple[str, ...]
-    ) -> tuple[_Part | FathomedPart, _Best | None]:
+    ) -> tuple[_Part | FathomedPart, StarDesign | None]:
         """Return a box as a search node, and a design near its middle if one was computed and is the best."""
         self._violated |= stage.programs.conflict
         self._finest = stage
@@ -394,5 +380,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
             window = box.program.window
             candidate = replace(self.candidate(window, nearest_throws(window, box.middle)), left_out=left_out)
             improved = self._improve(candidate, uses_search) if candidate.firing_order is not None else None
-            self._best = min(self._best, _Best(improved), key=lambda best: best.rank)
-        return _Part(box.bound, box, stage, left_out), self._best if uses_search or evaluates_middle else None
+            known = [design for design in (self._best, improved) if design is not None]
+            self._best = min(known, key=self.rank, default=None)
+        best = self._best if uses_search or evaluates_middle else None
+        return _Part(box.bound, box.is_exact, box, stage, left_out), best
