@@ -15,7 +15,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import evaluate_only
-from laufruhe.solvers.mounts.stars import _method, _solve_best_again, _stars, _with_bounds
+from laufruhe.solvers.mounts.stars import _method, _stars, _with_bounds
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
 from laufruhe.solvers.stars.star_results import StarDesign
@@ -134,36 +134,6 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
     minimum = found[0].value
     assert asked == [(minimum, math.inf, True), *[(minimum, 0.9 * minimum, True)] * 2]
     assert _with_bounds(found, phasing, len(found) + 1) is found
-
-
-@pytest.mark.parametrize(
-    ("answer", "names"),
-    [(9.5, ["again", "best", "ruled out", "late"]), (11.5, ["best", "ruled out", "open", "late"])],
-    ids=["better", "worse"],
-)
-def test_stars_that_may_still_be_the_best_are_searched_once_more(answer, names, tmp_path, monkeypatch):
-    """Not those that had all starts, nor those whose bound is no better than the best; worse answers are not kept."""
-    given = evaluate_only(problem_of(tmp_path, *parts(str(STARS[0]), search="[search]\nstarts = 2\n")))
-    problem = problem_of(tmp_path, *parts(search="[search]\nstarts = 8\n"))
-
-    def star(name, value, bound, starts):
-        own = replace(given.problem, title=name, search=replace(given.problem.search, starts=starts))
-        claim = Certificate(Proof.LOCAL, bound, 1.0, 0.0, "a bound")
-        objective = replace(given.objective, value=value)
-        return replace(given, problem=own, objective=objective, certificate=claim)
-
-    first, ruled_out, still_open = ("best", 10.0, 0.0, 8), ("ruled out", 10.5, 10.2, 2), ("open", 11.0, 9.0, 2)
-    each = first, ruled_out, still_open, ("late", 12.0, 0.0, 2)
-    found, searched = [StarDesign(Candidate((0.0,)), star(*one)) for one in each], []
-
-    def solved(own, defer_bounds):
-        searched.append((own.title, own.search.starts, defer_bounds))
-        return star("again", answer, 0.0, 8)
-
-    monkeypatch.setattr("laufruhe.solvers.mounts.stars.solve_mounts", solved)
-    again = _solve_best_again(problem, found)
-    assert searched == [("open", 8, True)]
-    assert [one.result.problem.title for one in again] == names
 
 
 @pytest.mark.slow
