@@ -292,7 +292,7 @@ def test_a_box_is_cut_where_its_program_leaves_most_out(side: int, tmp_path: Pat
     search = PlaceSearch(problem)
     lower, upper = search.bounds
     middle = np.array([0.03, -0.02])
-    box = _Box(lower, upper, 0.0, False, middle, np.where(np.arange(2) == side, 0.02, 0.01))
+    box = _Box(0.0, False, lower, upper, middle, np.where(np.arange(2) == side, 0.02, 0.01))
     halves = list(search.parts(box, np.inf))
     (low, _), (high, _) = halves
     assert isinstance(low, _Box)
@@ -304,7 +304,9 @@ def test_a_box_is_cut_where_its_program_leaves_most_out(side: int, tmp_path: Pat
         assert isinstance(half, _Box)
         assert found is not None
         engine, samples = problem.design(half.middle.tolist()), found.design.evaluation.samples
-        assert found.value == pytest.approx(objective_value(problem, evaluate(problem, engine, samples)), rel=1e-12)
+        assert found.design.value == pytest.approx(
+            objective_value(problem, evaluate(problem, engine, samples)), rel=1e-12
+        )
         assert half.bound <= objective_value(problem, evaluate(problem, engine, 5760)) * (1.0 + 1e-9)
     assert [found for _, found in search.parts(box, 0.0)] == [None, None]
 
