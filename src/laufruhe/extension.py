@@ -111,6 +111,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "random designs": "random_studies",
         "random scenes": "random_studies",
         "replication": "replication",
+        "skip fire": "skip_fire",
         "speed map": "speed_maps",
         "tolerance": "robust",
     },

@@ -291,10 +291,13 @@ def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) 
 def _compute_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Swing:
     torque, steps = driving_torque(engine, point, fidelity), FINE_SPEED * fidelity.samples
     angles = engine.cycle.angle * np.arange(steps) / steps
+    # a torque of extensions may repeat after several cycles only
+    cycles = int(engine.cycle.base_order / torque.base)
     work = torque.integral
     mean, (steady, bent) = float(torque.coefficients[0].real), (angles, torque.kink_angles)
     steady_inertia, bent_inertia = (moving_inertia(engine, fidelity, at)[0] for at in (steady, bent))
-    return Swing(point.speed, mean, work.sample(steps), steady_inertia, work.values(bent), bent_inertia)
+    steady_work = work.sample(cycles * steps)
+    return Swing(point.speed, mean, steady_work, np.tile(steady_inertia, cycles), work.values(bent), bent_inertia)
 
 
 _STEPS = 1024
