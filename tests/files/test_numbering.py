@@ -262,6 +262,14 @@ def test_opposed_pistons_in_one_direction_are_told_with_what_to_type() -> None:
     assert forces.max() < 1e-9
 
 
+@pytest.mark.parametrize("own", [{"first_end": "flywheel"}, {"first_bank": "right"}])
+def test_the_smallest_change_of_numbers_is_proposed(own: Table) -> None:
+    """The order fits with both keys changed as well as with one."""
+    (line,) = warnings({**FLAT_FOUR, **own})
+    assert 'write numbering = "alternating"; in the present numbers' in line
+    assert warnings({**FLAT_FOUR, "numbering": "alternating", **own}) == []
+
+
 def test_a_vee_that_other_numbers_make_more_even_is_told() -> None:
     (line,) = warnings(ODD_SIX)
     assert "fires after 30, 120, 120, 210, 120, 120 deg" in line

@@ -140,13 +140,8 @@ def _advice(table: EngineTable, order: Sequence[int], keys: Mapping[str, Any]) -
     """Return the keys of a numbering that fits, and the order in the present numbers."""
     degrees = [round(math.degrees(angle), 6) % 360.0 for angle in keys.get("throws", ())]
     angles = [int(angle) if angle.is_integer() else angle for angle in degrees]
-    own_keys = {key: table.value_of(key) for key in USUAL if table.kind.takes(key)}
     is_list = isinstance(keys.get("numbering"), list)
-    written = [
-        f"{key} = {toml_value(keys.get(key, USUAL[key]))}"
-        for key, value in own_keys.items()
-        if keys.get(key, USUAL[key]) != (value or USUAL[key]) and not (is_list and key not in keys)
-    ]
+    written = [f"{key} = {toml_value(value)}" for key, value in _changed_keys(table, keys).items()]
     written += [f"throws = {toml_value(angles)}"] if angles else []
     if "split_pin_angle" in keys:
         written.append(f"split_pin_angle = {math.degrees(keys['split_pin_angle']):.6g}")
@@ -154,11 +149,18 @@ def _advice(table: EngineTable, order: Sequence[int], keys: Mapping[str, Any]) -
             return f"if its pins are split, write {written[0]}; if it fires unevenly, list firing_intervals"
     if keys.keys() == {"throws"}:
         return f"if the angles of the throws count against the rotation, write {written[-1]}"
-    gone = [key for key in ("first_bank", "first_end") if is_list and own_keys.get(key)]
+    gone = [key for key in ("first_bank", "first_end") if is_list and table.value_of(key)]
     written_text = ", ".join(written) + (f" without {' and '.join(gone)}" if gone else "")
     now, then = (place_order(t, t.kind, len(order)) for t in (table, _renumbered(table, keys)))
     here = from_one([1 + now.index(then[number - 1]) for number in order])
     return f"if these are its maker's numbers, write {written_text}; in the present numbers the order is {_text(here)}"
+
+
+def _changed_keys(table: EngineTable, keys: Mapping[str, Any]) -> dict[str, Any]:
+    # keys of numbers that differ from those of the table; a list of numbers replaces the others
+    names = keys if isinstance(keys.get("numbering"), list) else filter(table.kind.takes, USUAL)
+    numbers = {key: keys.get(key, USUAL[key]) for key in names if key in USUAL}
+    return {key: value for key, value in numbers.items() if value != (table.value_of(key) or USUAL[key])}
 
 
 def _exchange(table: EngineTable, order: Sequence[int]) -> str:
@@ -190,10 +192,11 @@ def _reading(table: EngineTable) -> tuple[Mapping[str, Any], _Fit] | None:
 
 
 def _readings(table: EngineTable) -> Iterator[Mapping[str, Any]]:
-    """Yield the keys of usual numberings, also with throws whose angles count the other way."""
+    """Yield the keys of usual numberings, smallest change first, also with throws that count the other way."""
     kind, count = table.kind, len(table.listed_order or [])
     possible = {key for key in KEYS if kind.takes(key) and (key != "numbering" or kind.banks > 1)}
     numberings = [keys for keys in _NUMBERINGS if keys.keys() <= possible]
+    numberings.sort(key=lambda keys: len(_changed_keys(table, keys)))
     if kind.banks == kind.cylinders_per_throw == 2:
         near, far = list(range(1, count // 2 + 1)), list(range(count, count // 2, -1))
         numberings += [{"numbering": numbers} for numbers in (near + far, far + near)]

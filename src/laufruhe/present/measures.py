@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +12,11 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.torque import turning_inertia
+from laufruhe.present.numbers import with_unit
 from laufruhe.problem.channels import (
     CHANNELS,
     CRANK_PIN_FORCE,
+    CRANK_PIN_PRESSURE,
     FRICTION_POWER,
     MAIN_BEARING_FORCE,
     MOUNT_FORCE,
@@ -31,35 +34,58 @@ from laufruhe.solvers.values import LimitValue
 
 @dataclass(frozen=True)
 class Places:
-    """A force, or its power, shown place by place: key in `result.json`, and title and first head of its table."""
+    """A force, or its power, shown place by place: key in `result.json`, title, first head and note of its table."""
 
     key: str
     channel: LoadChannel
     title: str
     place: str
+    note: Callable[[Problem], str] = lambda _: ""
 
 
 MOUNTS = Places("mounts", MOUNT_FORCE, "Mount forces", "mount")
 BEARINGS = Places("main_bearings", MAIN_BEARING_FORCE, "Main-bearing forces", "bearing")
-PINS = Places("crank_pins", CRANK_PIN_FORCE, "Crank-pin forces", "pin of")
+PINS = Places("crank_pins", CRANK_PIN_FORCE, "Crank-pin forces", "pin of", lambda problem: pin_note(problem))
 FRICTION = Places("friction", FRICTION_POWER, "Friction power of main bearings", "bearing")
 
 
 def places_of(result: Result) -> list[Places]:
-    """Return the quantities that a result shows for each mount, bearing, pin or other place.
-
-    Inside the crankcase these are the requested quantities, or all if the engine has bearings.
-    """
+    """Return the quantities that a result shows for each mount, bearing, pin or other place."""
     engine, problem = result.problem.engine, result.problem
-    requested, inside = {measure.channel for measure in problem.measures}, has_bearing_loads(engine, problem.fidelity)
-    places_list = [MOUNTS] if engine.mounts else []
-    rubs = all(bearing.friction is not None for bearing in engine.bearings)
-    has_data = {BEARINGS: bool(engine.bearings), PINS: bool(engine.bearings), FRICTION: bool(engine.bearings) and rubs}
-    places_list += [
+    titled = () if problem.fidelity.has_uneven_speed else titled_places()
+    mounts = [MOUNTS] if engine.mounts else []
+    return [
+        *mounts,
+        *_crankcase_places(problem),
+        *(one for one in titled if one.channel.needs.of(engine) and one.channel.places(engine)),
+    ]
+
+
+def _crankcase_places(problem: Problem) -> list[Places]:
+    # the requested quantities, or all if the engine has bearings
+    bearings, requested = problem.engine.bearings, {measure.channel for measure in problem.measures}
+    rubs = all(bearing.friction is not None for bearing in bearings)
+    has_data = {BEARINGS: bool(bearings), PINS: bool(bearings), FRICTION: bool(bearings) and rubs}
+    inside = has_bearing_loads(problem.engine, problem.fidelity)
+    return [
         places for places, is_available in has_data.items() if inside and (is_available or places.channel in requested)
     ]
-    titled = () if problem.fidelity.has_uneven_speed else titled_places()
-    return [*places_list, *(one for one in titled if one.channel.needs.of(engine) and one.channel.places(engine))]
+
+
+def pin_note(problem: Problem) -> str:
+    """Return a sentence on the mass whose pull the crank-pin forces include (B3); empty if no such force is shown."""
+    masses = [part.rotating_mass for part in problem.engine.slider_cranks if part.master_bank is None]
+    if not {CRANK_PIN_FORCE, CRANK_PIN_PRESSURE} & {
+        *(measure.channel for measure in problem.measures), *(places.channel for places in _crankcase_places(problem))
+    }:  # fmt: skip
+        return ""
+    if not any(masses):
+        return (
+            "Crank-pin forces have no pull of a big end, because no [engine.rod] gives its mass; rotating_mass of a "
+            "throw loads the main bearings alone."
+        )
+    masses_text = " to ".join(dict.fromkeys(with_unit(mass, "kg") for mass in (min(masses), max(masses))))
+    return f"Crank-pin forces include the pull of a rotating mass of {masses_text} at each pin."
 
 
 def titled_places() -> list[Places]:

@@ -67,7 +67,8 @@ def _at_places(result: Result, places: Places) -> Table:
     scale = factor * max((by_design[0].max for _, by_design in measures), default=0.0)
     rows = [(*lead, *_cells([values.times(factor) for values in by_design], scale)) for lead, by_design in measures]
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
-    note = f"The initial design has no finite loads: {result.initial.resonance}." if result.initial.resonance else ""
+    note = f"The initial design has no finite loads: {result.initial.resonance}. " if result.initial.resonance else ""
+    note = (note + places.note(result.problem)).rstrip()
     if places.channel.sums_places:
         sums = [number(factor * design.value(Measure(places.channel))) for design in designs]
         note = f"Sum, mean over the cycle: {' initial, '.join(sums)}{' final' if len(sums) > 1 else ''}."

@@ -1,0 +1,38 @@
+"""The mass whose pull the crank-pin forces include is stated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+import laufruhe
+from laufruhe.present.measures import pin_note
+from laufruhe.report.sections import loads
+
+SINGLE: dict[str, Any] = {
+    "title": "Single",
+    "operating_points": [{"speed": "3000 rpm"}],
+    "main_bearings": [{"x": "-60 mm"}, {"x": "60 mm"}],
+    "engine": {
+        "layout": "inline", "cycle": "four-stroke", "stroke": "90 mm", "rod_length": "160 mm", "throws": [0],
+        "reciprocating_mass": "0.6 kg", "rotating_mass": "0.5 kg",
+    },
+}  # fmt: skip
+ROD = {"mass": "0.6 kg", "centre_of_gravity": "40 mm", "inertia": "0.003 kg m^2"}
+
+
+@pytest.mark.parametrize(("rod", "mass"), [({}, 0.0), ({"rod": ROD}, 0.45)])
+def test_the_note_states_the_mass_at_the_pin(rod: dict[str, Any], mass: float) -> None:
+    problem = laufruhe.load(SINGLE | {"engine": SINGLE["engine"] | rod})
+    note = pin_note(problem)
+    assert note.startswith("Crank-pin forces have no pull of a big end" if not rod else "Crank-pin forces include")
+    assert ("0.45 kg at each pin" in note) == bool(rod)
+    assert problem.engine.slider_cranks[0].rotating_mass == pytest.approx(mass)
+    tables = {table.title.partition(" at ")[0]: table.note for table in loads.places(laufruhe.evaluate(problem))}
+    assert tables["Crank-pin forces"] == note
+    assert not tables["Main-bearing forces"]
+
+
+def test_no_note_without_forces_on_pins() -> None:
+    assert not pin_note(laufruhe.load({key: value for key, value in SINGLE.items() if key != "main_bearings"}))
