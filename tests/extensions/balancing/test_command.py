@@ -122,6 +122,19 @@ def test_a_rotor_within_its_grade_needs_no_hole(folder: Path) -> None:
     assert "No hole is needed: the unbalance of both planes is permitted." in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("wall", "note"),
+    [
+        ("", "The file gives no wall: a drill may break through into the next hole"),
+        ('wall = "2 mm"', "At least 2 mm of material is left between holes"),
+    ],
+)
+def test_the_list_of_holes_states_the_wall(folder: Path, wall: str, note: str) -> None:
+    text = JOB.replace('wall = "2 mm"', wall).replace('"20 g mm"', '"401 g mm"')
+    (folder / "disc.toml").write_text(text, encoding="utf-8")
+    assert note in " ".join(run("disc.toml").stdout.split())
+
+
 PLANE = "correction.planes[1]"
 
 

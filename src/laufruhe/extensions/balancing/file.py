@@ -113,7 +113,9 @@ class CorrectionTable(Table):
     max_depth: f.PositiveLength = f.required(
         "Largest depth of a hole, to the end of the full diameter; the drill's point goes deeper."
     )
-    wall: f.NonNegativeLength = f.optional("Least material between two holes, and to the edge of a sector.", 0.0)
+    wall: f.NonNegativeLength = f.optional(
+        "Least material between two holes, and to the edge of a sector; without it holes may touch.", 0.0
+    )
     max_holes: int = Field(default=4, ge=1, le=MAX_HOLES, description="Largest number of holes in a plane.")
     slugs: SlugsTable | None = None
     permitted_unbalance: str | None = Field(

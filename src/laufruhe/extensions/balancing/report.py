@@ -184,9 +184,16 @@ def _hole_table(answer: Balanced) -> Table:
     )
     note = (
         f"Holes {way}. Depth, like max_depth, to the end of the full diameter.{point} "
-        f"The machine counts {sense} the rotation from the zero mark, at {zero} deg on the crank."
+        f"The machine counts {sense} the rotation from the zero mark, at {zero} deg on the crank. {_wall(answer)}"
     )
     return Table(head, rows, title="Holes", left=(1, 2), note=note)
+
+
+def _wall(answer: Balanced) -> str:
+    (length, factor), wall = _units()[0], max(plane.wall for plane in answer.correction.planes)
+    if not wall:
+        return "The file gives no wall: a drill may break through into the next hole, or at the edge of a sector."
+    return f"At least {trimmed(factor * wall)} {length} of material is left between holes, and at the edge of a sector."
 
 
 def _units() -> tuple[tuple[str, float], ...]:
