@@ -162,9 +162,11 @@ def test_torque_and_power_have_units_of_choice_and_unbalances_those_of_mass_and_
         assert readable("kg m", "g mm") == ("lb in", pytest.approx(1.0 / (0.45359237 * 0.0254), rel=1e-12))
         assert readable("kg m^2") == ("kg cm²", pytest.approx(1e4, rel=1e-12))
     usual = gas_rows(problem)[0][1:]
-    assert gas_head()[4:] == ("gas torque [N m]", "gas power [kW]", "power [kW/l]", "brake torque [N m]")
-    assert head[4:] == ("gas torque [kp m]", "gas power [PS]", "power [PS/l]", "brake torque [kp m]")
-    factors = (1.0, 1.0, 1.0, 9.80665, 0.73549875, 0.73549875, 9.80665)
+    brake = ("brake torque [N m]", "friction [N m]", "fmep [bar]")
+    assert gas_head()[4:] == ("gas torque [N m]", "gas power [kW]", "power [kW/l]", *brake)
+    brake = ("brake torque [kp m]", "friction [kp m]", "fmep [bar]")
+    assert head[4:] == ("gas torque [kp m]", "gas power [PS]", "power [PS/l]", *brake)
+    factors = (1.0, 1.0, 1.0, 9.80665, 0.73549875, 0.73549875, 9.80665, 9.80665, 1.0)
     for mine, theirs, factor in zip(rows, usual, factors, strict=True):
         assert float(mine) * factor == pytest.approx(float(theirs), rel=2e-3)
 

@@ -35,8 +35,8 @@ class GasFacts:
         Least absolute pressure, and work of one cycle over the displacement (G3) [Pa].
     torque, power
         Mean torque of the gas in all cylinders [N m], and its power [W].
-    friction
-        Mean torque that friction takes of it (L5b) [N m].
+    friction, fmep
+        Mean torque that friction takes of it (L5b) [N m], and its mean effective pressure [Pa].
     displacement
         Swept volume of all cylinders [m3].
     recording
@@ -50,6 +50,7 @@ class GasFacts:
     torque: float
     power: float
     friction: float
+    fmep: float
     displacement: float
     recording: tuple[str, ...]
 
@@ -93,7 +94,7 @@ def gas_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT)
     recording = gas.recording if isinstance(gas, PressureTrace) else ()
     return GasFacts(
         peak, math.remainder(angle, period), minimum, work / swept[first], sum(torques), sum(torques) * point.speed,
-        mean_torque(point.fmep, sum(swept), engine.cycle.turns), sum(swept), recording,
+        mean_torque(point.fmep, sum(swept), engine.cycle.turns), point.fmep, sum(swept), recording,
     )  # fmt: skip
 
 
@@ -109,7 +110,7 @@ def _chamber_facts(
     return GasFacts(
         peak, math.remainder(angle, math.tau), minimum,
         torque * math.tau / swept, torque, torque * point.speed,
-        mean_torque(point.fmep, swept, engine.cycle.turns), swept, (),
+        mean_torque(point.fmep, swept, engine.cycle.turns), point.fmep, swept, (),
     )  # fmt: skip
 
 

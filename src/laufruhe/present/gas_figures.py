@@ -21,11 +21,11 @@ _LINES = 8
 
 
 def gas_head() -> tuple[str, ...]:
-    """Return the heads of the figures of the gas, before friction; the last one is after it."""
+    """Return the heads of the figures of the gas; the last three are those of the brake and of friction."""
     torque, power = readable("N m")[0], readable("W", "kW")[0]
     return (
         "at", "peak [bar]", "peak at [deg]", "imep [bar]", f"gas torque [{torque}]", f"gas power [{power}]",
-        f"power [{power}/l]", f"brake torque [{torque}]",
+        f"power [{power}/l]", f"brake torque [{torque}]", f"friction [{torque}]", "fmep [bar]",
     )  # fmt: skip
 
 
@@ -94,10 +94,10 @@ def gas_lines(problem: Problem) -> list[str]:
     """Return the sentences of `gas_note`, and a line for each operating point with gas."""
     lines, rows = [f"gas: {sentence}" for sentence in gas_note(problem)], gas_rows(problem)
     unit, power_unit = readable("N m")[0], readable("W", "kW")[0]
-    for name, peak, angle, imep, torque, power, density, brake in rows[:_LINES]:
+    for name, peak, angle, imep, torque, power, density, brake, friction, fmep in rows[:_LINES]:
         line = f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, gas torque {torque} {unit}, "
-        friction = f"; brake torque {brake} {unit}" if brake != torque else ""
-        lines.append(f"{line}power {power} {power_unit}, {density} {power_unit}/l{friction}")
+        after = f"; friction {friction} {unit}, fmep {fmep} bar; brake torque {brake} {unit}" if brake != torque else ""
+        lines.append(f"{line}power {power} {power_unit}, {density} {power_unit}/l{after}")
     further = len(rows) - _LINES
     return [*lines, f"gas: the report has {counted(further, 'further operating point')}"] if further > 0 else lines
 
@@ -112,6 +112,6 @@ def _figures(facts: GasFacts) -> list[str]:
     brake = facts.torque - facts.friction if abs(facts.torque - facts.friction) > 1e-9 * abs(facts.torque) else 0.0
     numbers = (
         1e-5 * facts.peak_pressure, DEGREE * facts.peak_angle, 1e-5 * facts.imep, turning * facts.torque, power,
-        power / (1e3 * facts.displacement), turning * brake,
+        power / (1e3 * facts.displacement), turning * brake, turning * facts.friction, 1e-5 * facts.fmep,
     )  # fmt: skip
     return [trimmed(number) for number in numbers]

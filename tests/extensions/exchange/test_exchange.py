@@ -92,6 +92,10 @@ def test_universal_file_is_read_by_pyuff(exported: Callable[[str], Path], elasti
             x, kind = np.arange(61) * 0.5 * point.speed / (2.0 * np.pi), 18
         assert one["abscissa_spec_data_type"] == kind
         assert one["x"] == pytest.approx(x, rel=1e-5)
+        if one["func_type"] == 12:
+            # numerical zeros are 0
+            assert np.abs(expected[one["data"] == 0.0]).max(initial=0.0) < 1e-7 * np.abs(expected).max()
+            expected = np.where(one["data"] == 0.0, 0.0, expected)
         assert one["data"] == pytest.approx(expected, rel=1e-10, abs=1e-90)
 
 
@@ -104,17 +108,21 @@ def test_tables_have_amplitude_and_phase(to: str, exported: Callable[[str], Path
         table = pd.read_csv(path, comment="#")
     else:
         table = pd.DataFrame(json.loads(path.read_text())["loads"])
-    assert len(table) == 2 * 24 * 61
+    assert len(table) < 24 * 61
     assert table["frequency [Hz]"].values == pytest.approx((table["order"] * table["speed [rpm]"] / 60.0).values)
     polar = table["amplitude"] * np.exp(1j * np.radians(table["phase [deg]"]))
     assert polar.values == pytest.approx((table["real"] + 1j * table["imaginary"]).values, rel=1e-12, abs=1e-12)
     for (point, place, quantity, axis), rows in table.groupby(["operating point", "place", "quantity", "direction"]):
         if place != "block":
-            expected = series_of(elastic, point, place, quantity, axis).sel(order=slice(None, 30.0)).values
+            series = series_of(elastic, point, place, quantity, axis).sel(order=slice(None, 30.0))
+            expected = series.sel(order=rows["order"].values).values
             assert rows["real"].values + 1j * rows["imaginary"].values == pytest.approx(expected, rel=1e-12)
+            # what is left out is a numerical zero
+            largest = table.loc[table["quantity"] == quantity, "amplitude"].max()
+            assert np.abs(series.drop_sel(order=rows["order"].values)).max() < 1e-7 * largest
             assert set(rows["grid"]) == {GRIDS[place]}
     about_x = table[(table.direction == "about x") & (table["operating point"] == "idle")]
-    moment = series_of(elastic, "idle", "block", "moment", "x").sel(order=slice(None, 30.0)).values
+    moment = series_of(elastic, "idle", "block", "moment", "x").sel(order=about_x["order"].values).values
     assert about_x["real"].values == pytest.approx(moment.real, rel=1e-12)
     assert set(about_x["unit"]) == {"N m"}
 
@@ -204,7 +212,9 @@ def test_bulk_data_of_nastran(exported: Callable[[str], Path], elastic: laufruhe
                 x, y = np.array(tables[table][7:-1]).reshape(-1, 2).T
                 assert np.array_equal(x, [0.0, *frequencies])
                 parts.append(y[1:])
-            assert parts[0] + 1j * parts[1] == pytest.approx(expected, rel=1e-8, abs=1e-90)
+            wave = parts[0] + 1j * parts[1]
+            assert wave == pytest.approx(np.where(wave == 0.0, 0.0, expected), rel=1e-8, abs=1e-90)
+            assert np.abs(expected[wave == 0.0]).max(initial=0.0) < 1e-7 * np.abs(expected).max()
         assert loaded == {(grid, direction) for grid in GRIDS.values() for direction in (1, 2, 3)}
         means = {card[2]: card[4:] for card in cards if card[:2] == ["FORCE", k + 500_000]}
         for place, grid in GRIDS.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -14,6 +14,8 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.present.numbers import RPM
 from laufruhe.problem.curves import forces_of, harmonics_of
+from laufruhe.problem.measure import MEASURES, Measure, Term
+from laufruhe.problem.numerical_zero import OF_ORDERS, ROUNDING, numerical_zero
 from laufruhe.solvers.result import FINAL, Result
 from laufruhe.version import __version__
 
@@ -29,11 +31,13 @@ CONVENTION = (
     "peak amplitudes; exp(+i w t)",
 )
 """Directions, senses and phases in words (C2, C7, C8)."""
-_FIELDS = {
-    "shaking_force": ("force", 1), "shaking_moment": ("moment", 4), "mount_force": ("force", 1),
-    "mount_travel": ("displacement", 1),
-}  # fmt: skip
-"""Quantity and first direction of exported fields."""
+_FIELDS: Mapping[str, tuple[str, int, tuple[str, ...]]] = {
+    "shaking_force": ("force", 1, ("rms shaking force",)),
+    "shaking_moment": ("moment", 4, ("rms roll moment", "rms rocking couple")),
+    "mount_force": ("force", 1, ("rms mount force",)),
+    "mount_travel": ("displacement", 1, ("rms mount travel",)),
+}
+"""Quantity and first direction of exported fields, and the measures whose numerical zero is theirs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,7 @@ class Component:
     values
         Values over the cycle, shape (points, steps).
     series
-        Complex coefficients by order, shape (points, orders) (C8).
+        Complex coefficients by order, shape (points, orders) (C8); numerical zeros are 0.
     """
 
     place: str
@@ -114,7 +118,10 @@ def export_loads(result: Result, nodes: Mapping[str, int], highest: float, milli
     orders = np.array(harmonics.rows[1].labels)
     count, components = int(np.sum(orders <= highest)), []
     for field in (field for field in forces_of({FINAL: result.final}).fields if field.name in _FIELDS):
-        quantity, first = _FIELDS[field.name]
+        quantity, first, measures = _FIELDS[field.name]
+        terms = tuple(Term(Measure(*MEASURES[name])) for name in measures)
+        zero_level = numerical_zero(replace(result.problem, objective=terms), result.final.engine)
+        zero_level *= OF_ORDERS / ROUNDING
         is_scaled = millimetres and quantity != "force"
         factor, unit = (1e3, field.unit.replace("m", "mm")) if is_scaled else (1.0, field.unit)
         for index in product(*(range(len(axis.labels)) for axis in field.own_axes)):
@@ -122,6 +129,7 @@ def export_loads(result: Result, nodes: Mapping[str, int], highest: float, milli
             values, coefficients = field.values[0][..., *index].real, series[field.name][:, :count, *index].copy()
             # the mean has no phase
             coefficients[:, 0] = coefficients[:, 0].real
+            coefficients[np.abs(coefficients) <= zero_level] = 0.0
             direction = first + index[-1]
             components.append(
                 Component(place, nodes.get(place, 0), quantity, unit, direction, factor * values, factor * coefficients)
@@ -165,10 +173,14 @@ def node_numbers(engine: Engine, text: str) -> dict[str, int]:
 
 
 def rows(loads: ExportLoads) -> Iterator[tuple[str | float | None, ...]]:
-    """Yield point, speed, order, frequency, place, node, quantity, direction, unit, amplitude, phase [deg], Re, Im."""
+    """Yield point, speed, order, frequency, place, node, quantity, direction, unit, amplitude, phase [deg], Re, Im.
+
+    Orders without an amplitude are left out.
+    """
     for k, point in enumerate(loads.points):
         for c in loads.components:
             place = (c.place, c.node or None, c.quantity, c.axis, c.unit)
             for order, hertz, value in zip(loads.orders, loads.frequencies(k), c.series[k], strict=True):
-                polar = (abs(value), math.degrees(np.angle(value + 0.0)), value.real, value.imag)
-                yield (point.name, point.speed * RPM, float(order), float(hertz), *place, *map(float, polar))
+                polar = (abs(value), math.degrees(np.angle(value)), value.real, value.imag)
+                if value:
+                    yield (point.name, point.speed * RPM, float(order), float(hertz), *place, *map(float, polar))

@@ -16,14 +16,14 @@ _NOTES = (
     "LOAD has the means of gas and moving masses, without the weight of the engine",
 )
 _ON_MOUNTS = "forces of mounts act on a model of what carries the engine"
-_TINY, _NOISE = 1e-99, 1e-9
-"""Least size of a number that fits into 16 characters, and of an order beside the largest."""
+_TINY = 1e-99
+"""Least size of a number that fits into 16 characters."""
 
 
 def bulk_data(loads: ExportLoads) -> str:
     """Return the loads on grids: orders above zero as RLOAD1, means as FORCE and MOMENT, for each operating point.
 
-    Orders below 1e-9 of the largest are left out.
+    Orders without an amplitude are left out.
     """
     components = [c for c in loads.components if c.node and c.quantity != "displacement"]
     units = ", ".join(dict.fromkeys(c.unit for c in components))
@@ -39,8 +39,7 @@ def bulk_data(loads: ExportLoads) -> str:
         mean = f"mean: LOAD = {static}" if any(map(any, means.values())) else "no mean loads"
         lines.append(f"$ {speed_text(point)}: DLOAD = FREQUENCY = {dynamic}; {mean}")
         waves = np.array([c.series[k, 1:] for c in components])
-        sizes = np.abs(waves).max(axis=0)
-        excited = sizes > _NOISE * sizes.max(initial=0.0)
+        excited = waves.any(axis=0)
         hertz, members = loads.frequencies(k)[1:][excited], list[Any]()
         for c, wave in zip(components, waves[:, excited], strict=True):
             if wave.any():

@@ -130,7 +130,7 @@ def _orders(
     sides = ("",) if len(designs) == 1 else (", initial", ", final")
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
     selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
-    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
+    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. orders.csv has every point and order."
     units = ", ".join(dict.fromkeys(unit for unit, _ in units_of_names))
     return Table(head, rows, title=f"{title} at {result.problem.points[k].name} [{units}]", note=note)
 
@@ -147,7 +147,10 @@ def _amplitudes(loads: PointLoads) -> list[Array]:
 def gas(result: Result) -> list[Table]:
     """Return a row of key figures per operating point with gas."""
     rows, note = gas_rows(result.problem), " ".join(gas_note(result.problem))
-    return [Table(gas_head(), rows, title="Gas pressure", note=note, file="gas-pressure")]
+    # without friction the last two columns have zeros
+    last = None if any(point.fmep for point in result.problem.points) else -2
+    head, rows = gas_head()[:last], [row[:last] for row in rows]
+    return [Table(head, rows, title="Gas pressure", note=note, file="gas-pressure")]
 
 
 def torque(result: Result) -> list[Table]:
