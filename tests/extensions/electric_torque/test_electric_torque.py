@@ -159,7 +159,23 @@ def test_copper_loss_and_current_limit_the_torque() -> None:
     (facts,) = SECTION.record(result)["isg"] if SECTION.record else ()
     assert facts["copper_loss"] == pytest.approx(200.0, rel=1e-4)
     assert facts["electric_power"] == pytest.approx(200.0 - 10.0 * result.problem.points[0].speed, rel=1e-4)
-    assert [table.title for table in SECTION.tables(result)] == ["Electric machines"]
+    (table,) = SECTION.tables(result)
+    assert table.title == "Electric machines"
+    assert "isg.max_current of 400 A is 200 N m; isg.max_loss of 200 W is 31.62 N m rms." in table.note
+
+
+@pytest.mark.parametrize(
+    ("keys", "minimise", "is_idle"),
+    [
+        ({"stator": "ground"}, "rms roll moment", True),
+        ({"stator": "ground"}, "peak to peak stored work", False),
+        ({}, "rms roll moment", False),
+    ],
+)
+def test_a_machine_that_moves_nothing_measured_is_named(keys: dict[str, Any], minimise: str, is_idle: bool) -> None:
+    result = laufruhe.evaluate(problem_of([machine(**keys)], minimise))
+    (table,) = SECTION.tables(result)
+    assert ("isg acts on nothing that is minimised or limited" in table.note) is is_idle
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
-from laufruhe.extensions.electric_torque.machine import machines_of
+from laufruhe.extensions.electric_torque.channels import ELECTRIC_TORQUE
+from laufruhe.extensions.electric_torque.machine import ElectricMachines, machines_of
 from laufruhe.present.numbers import figure, number
 from laufruhe.present.tables import Table
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
 
@@ -63,8 +65,37 @@ def _tables(result: Result) -> list[Table]:
         "Final design: amplitude a and angle b stand for a cos(order x crank angle + b). Electric power: mechanical "
         "power of the mean torque, and copper loss. An alternating torque takes and gives back equal energy."
     )
+    of_limits = "; ".join(_limit_words(result))
+    note += f" Limits of the torque: {of_limits}." if of_limits else ""
+    for name in _without_effect(result):
+        note += f" {name} acts on nothing that is minimised or limited beside its own torque."
     head = ("at", "machine", "alternating torque", *(key.replace("_", " ") for key in columns))
     return [Table(head, tuple(rows), title="Electric machines", left=3, note=note, file="electric-machines")]
+
+
+def _without_effect(result: Result) -> list[str]:
+    # machines whose torque changes no measure, such as one on the crank whose stator stands on the ground
+    engine, names = result.final.engine, list[str]()
+    measures = {measure for measure in result.problem.measures if measure.channel is not ELECTRIC_TORQUE}
+    extra = engine.extra(ElectricMachines) or ElectricMachines()
+    for one in extra.machines if not result.final.resonance else ():
+        moved = extra.moved({(one.name, k): 1.0 for k in range(len(one.harmonics))}, (), ())
+        other = evaluate(result.problem, engine.with_extra(moved), result.final.samples)
+        if one.harmonics and all(other.value(measure) == result.final.value(measure) for measure in measures):
+            names.append(one.name)
+    return names
+
+
+def _limit_words(result: Result) -> Iterator[str]:
+    # the torque of a limit, and the current or loss that its key states
+    limits = {limit.name: limit.maximum for limit in result.problem.limits}
+    for one in machines_of(result.final.engine):
+        constant, points = one.torque_constant or math.nan, ["", *(f" at {p.name}" for p in result.problem.points)]
+        if (torque := limits.get(f"{one.name}.max_current")) is not None:
+            yield f"{one.name}.max_current of {figure(torque / constant, 'A')} is {figure(torque, 'N m')}"
+        for torque in [limits[name] for place in points if (name := f"{one.name}.max_loss{place}") in limits][:1]:
+            loss = (one.resistance or math.nan) * (torque / constant) ** 2
+            yield f"{one.name}.max_loss of {figure(loss, 'W')} is {figure(torque, 'N m')} rms"
 
 
 SECTION = Section("electric_machines", has_machines, _tables, _record, ("electric-machines",))
