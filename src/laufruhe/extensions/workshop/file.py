@@ -250,12 +250,12 @@ def _within_body(problem: Problem, crankcase: Crankcase, rotor: Rotor, sizes: Bo
     fit = fit_of(sizes, crankcase, engine.slider_cranks, engine.cycle.angle, seat)
     reach = sizes.largest.shape.outer_radius
     if not places and not fit.fits:
-        found = sorted(
+        distances = sorted(
             clearances(crankcase, engine.slider_cranks, engine.cycle.angle, sizes.smallest, seat),
             key=lambda one: one.minimum.distance,
         )
         # bodies that overlap have no order of distances
-        hit = " and ".join(one.part for one in found if one.minimum.bound < crankcase.clearance) or "other parts"
+        hit = " and ".join(one.part for one in distances if one.minimum.bound < crankcase.clearance) or "other parts"
         rule, remedy = f"does not keep its clearance from {hit}", "make it smaller, or move it"
         if sizes.has_open_shape:
             raise Refused(where, None, rule, remedy)
