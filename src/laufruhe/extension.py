@@ -22,7 +22,7 @@ from laufruhe.errors import ModelError
 GROUP = "laufruhe.extensions"
 Tables = Literal[
     "norms", "channels", "kinds", "layouts", "drives", "methods", "quantities", "provers", "reductions", "study_kinds",
-    "commands", "keys", "weight_keys", "notes", "pictures", "sections",
+    "commands", "keys", "weight_keys", "notes", "pictures", "sections", "advice",
 ]  # fmt: skip
 
 
@@ -69,6 +69,8 @@ class Extension:
         Objects of `laufruhe.report.section.Section`: tables and numbers of a result.
     pictures
         Objects of `laufruhe.present.pictures.ResultPicture`.
+    advice
+        Objects of `laufruhe.problem.advice.Advice`: warnings about problems, and remedies for refused files.
     """
 
     name: str
@@ -89,6 +91,7 @@ class Extension:
     notes: tuple[str, ...] = ()
     sections: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ()
 
 
 _OF_SIZES = (

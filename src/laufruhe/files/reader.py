@@ -32,7 +32,6 @@ from laufruhe.files.complaints import (
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import with_fidelity
 from laufruhe.files.fields import check_format
-from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import RecordedGasTable, SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
 from laufruhe.files.load_torque import load_torque_of
@@ -50,6 +49,7 @@ from laufruhe.files.toml_text import line_deeper_than, toml_complaint, toml_text
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.machine.slider_crank import displacement
+from laufruhe.problem.advice import ADVICE
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Origin, Problem, Search
 from laufruhe.problem.problem import Path as Place
@@ -138,11 +138,14 @@ def _loaded(tables: Mapping[str, Any], path: Path) -> Problem:
             for note in reversed(notes()):
                 closed, parts[note] = note.part(closed)
             file = file_model().model_validate(with_followers(closed))
-            with explained_orders(file.engine):
+            try:
                 problem = _of_file(file, path)
-            if problem.phasing is None:
-                of_order = order_warnings(file.engine, problem.engine.slider_cranks)
-                problem = replace(problem, warnings=(*problem.warnings, *of_order))
+            except Refused as refusal:
+                for advice in ADVICE.values():
+                    refusal.complaint = advice.remedied(file.engine, refusal.complaint)
+                raise
+            warnings = (warning for advice in ADVICE.values() for warning in advice.about_file(file.engine, problem))
+            problem = replace(problem, warnings=(*problem.warnings, *warnings))
 
             def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
                 problem_of_star = replace(problem_of_star, rebuild=partial(_changed_drawing, closed, path, candidate))

@@ -197,6 +197,15 @@ class Engine:
         following = [*turns[1:], turns[0] + cycle_turns] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))
 
+    @property
+    def simultaneous_firings(self) -> list[list[str]]:
+        """Names of cylinders that fire at the same crank angle, in groups of two or more."""
+        fires: dict[float, list[str]] = {}
+        for part in self.cylinders:
+            turn = round(float(reduced_turn(as_turn(part.firing_angle), self.cycle.turns)), 9)
+            fires.setdefault(turn, []).append(part.name)
+        return [names for names in fires.values() if len(names) > 1]
+
 
 def parts_with_leads(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
     """Return the slider-cranks with other lead angles of their shafts [rad], by shaft name (L10)."""

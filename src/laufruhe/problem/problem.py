@@ -18,11 +18,11 @@ from laufruhe.machine.facing import Facing
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.problem.decision import Decision, Kind, NumberDrive, Numbers, apply_decisions
+from laufruhe.problem.advice import ADVICE
+from laufruhe.problem.decision import Decision, Numbers, apply_decisions
 from laufruhe.problem.goals import Goals
 from laufruhe.problem.measure import Limit, Measure, PriorityLevel, Term
 from laufruhe.problem.phasing import PhasingOf
-from laufruhe.problem.plausibility import plausibility_warnings
 from laufruhe.problem.sets import Value
 from laufruhe.problem.statements import Statements
 from laufruhe.units import quantity
@@ -234,10 +234,7 @@ class Problem(Goals, Statements):
     @property
     def plausibility_warnings(self) -> tuple[Complaint, ...]:
         """Warnings about the file and about unusual numbers, which stop nothing."""
-        allowed = self.fires_together or self.phasing is not None
-        drives = (drive for decision in self.decisions for drive in decision.drives)
-        open_masses = {drive.key[0] for drive in drives if isinstance(drive, NumberDrive) and drive.kind is Kind.PISTON}
-        return (*self.warnings, *plausibility_warnings(self.engine, self.points, allowed, open_masses))
+        return (*self.warnings, *(warning for advice in ADVICE.values() for warning in advice.about_problem(self)))
 
     @property
     def unbalances(self) -> tuple[Decision, ...]:

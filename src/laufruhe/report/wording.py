@@ -11,7 +11,6 @@ from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.present.measures import breaks_a_limit, hardest_point, has_firing, is_changed
 from laufruhe.present.numbers import figure, number, percent, share, trimmed, with_unit
 from laufruhe.present.static_load import static_sentence
-from laufruhe.problem.plausibility import simultaneous_firings
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import RankedStar
@@ -153,7 +152,7 @@ def fired(result: Result) -> str:
     lead = f"Firing order {order}" if firing else f"Dead centres at the head end in the order {order}"
     spacing = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"
     sentence, do = f"{lead}, {spacing}.", "fire" if firing else "reach it"
-    groups = [f"{', '.join(names[:-1])} and {names[-1]} {do} at once" for names in simultaneous_firings(engine)]
+    groups = [f"{', '.join(names[:-1])} and {names[-1]} {do} at once" for names in engine.simultaneous_firings]
     text = "; ".join(groups)
     return f"{sentence} {text[:1].upper()}{text[1:]}." if text else sentence
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -14,9 +13,11 @@ from laufruhe.errors import Complaint, ModelError
 from laufruhe.machine import Engine, OperatingPoint, PressureTrace
 from laufruhe.machine.chambers import models_of
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.exact_angles import as_turn, reduced_turn
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts, gas_facts
 from laufruhe.physics.pressure_trace import bottom_pressure
+from laufruhe.problem.advice import Advice
+from laufruhe.problem.decision import Kind, NumberDrive
+from laufruhe.problem.problem import Problem
 from laufruhe.units import quantity_text
 
 FASTEST = 30.0
@@ -49,17 +50,15 @@ MAX_REST = 0.02
 _ROUNDING = 1e-6
 
 
-def plausibility_warnings(
-    engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False, open_masses: Container[str] = ()
-) -> tuple[Complaint, ...]:
-    """Return warnings about unusual numbers of an engine, such as a rod ratio above 0.5, one for each part.
-
-    `fires_together` is True if cylinders may fire at the same time without a warning. `open_masses` names the
-    slider-cranks whose reciprocating mass is open, so that its start may be any.
-    """
+def _warnings(problem: Problem) -> tuple[Complaint, ...]:
+    """Return warnings about unusual numbers of a problem, such as a rod ratio above 0.5, one for each part."""
+    engine, points = problem.engine, problem.points
+    drives = (drive for decision in problem.decisions for drive in decision.drives)
+    # the start of an open mass may be any
+    open_masses = {drive.key[0] for drive in drives if isinstance(drive, NumberDrive) and drive.kind is Kind.PISTON}
     warnings = [*_of_speed(engine, points), *_of_pistons(engine, open_masses), *_of_rotors(engine), *_of_mounts(engine)]
     warnings += [
-        *([] if fires_together else _of_firing(engine)),
+        *([] if problem.fires_together or problem.phasing is not None else _of_firing(engine)),
         *_of_gas(engine, points),
         *_of_motored_traces(engine, points),
         *_of_machines(engine, points),
@@ -68,14 +67,6 @@ def plausibility_warnings(
     for warning in warnings:
         first.setdefault(warning.where, warning)
     return tuple(first.values())
-
-
-def simultaneous_firings(engine: Engine) -> list[list[str]]:
-    """Return the names of cylinders that fire at the same crank angle, in groups of two or more."""
-    fires: dict[float, list[str]] = defaultdict(list)
-    for part in engine.cylinders:
-        fires[round(float(reduced_turn(as_turn(part.firing_angle), engine.cycle.turns)), 9)].append(part.name)
-    return [names for names in fires.values() if len(names) > 1]
 
 
 def _of_speed(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
@@ -132,7 +123,7 @@ def _of_mounts(engine: Engine) -> Iterator[Complaint]:
 
 
 def _of_firing(engine: Engine) -> Iterator[Complaint]:
-    groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in simultaneous_firings(engine)]
+    groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in engine.simultaneous_firings]
     remedy = "give a firing order, or write fires_together = true in [engine] if that is meant"
     if groups:
         yield Complaint("firing", "", f"occurs at once in {'; in '.join(groups)}", remedy)
@@ -232,3 +223,6 @@ def _of_motored_traces(engine: Engine, points: Sequence[OperatingPoint]) -> Iter
                 rule = f"has its peak {quantity_text(facts.peak_angle, 'rad', 2)} after dead centre"
                 remedy = "check angle_zero; losses move the peak of a motored cylinder 0.3 to 1 deg before dead centre"
                 yield Complaint("motored pressure", "", rule, remedy)
+
+
+ADVICE = Advice("numbers to check", about_problem=_warnings)

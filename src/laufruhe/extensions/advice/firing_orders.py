@@ -5,14 +5,13 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, TypeAlias
 
 from laufruhe.errors import Complaint
-from laufruhe.files.complaints import Refused
+from laufruhe.files.complaints import Refused, value_text
 from laufruhe.files.engine import EngineTable, cycle_of, idle_cylinders, layout_of, moving_parts
 from laufruhe.files.numbering import ALTERNATING, BY_BANK, KEYS, USUAL, place_order
 from laufruhe.files.toml_text import toml_value
@@ -20,6 +19,8 @@ from laufruhe.machine import Cycle, SliderCrank
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.machine.firing import from_one, intervals_of
 from laufruhe.numerics.exact_angles import Turn, as_turn, reduced_turn
+from laufruhe.problem.advice import Advice
+from laufruhe.problem.problem import Problem
 
 Pair: TypeAlias = tuple[int, int]
 _WHERE = "engine.firing_order"
@@ -69,24 +70,20 @@ class _Fit:
         return tuple((a, b) for a, b in due if not _is_whole(parts[a].star_turn - parts[b].star_turn))
 
 
-@contextmanager
-def explained_orders(table: EngineTable) -> Iterator[None]:
-    """Replace the refusal of a firing order in the block by one that names cylinders and a numbering that fits."""
-    try:
-        yield
-    except Refused as refusal:
-        order = table.listed_order
-        is_order = refusal.complaint.where == _WHERE and table.kind.takes("numbering") and not table.firing_intervals
-        if order is None or not is_order or sorted(order) != list(range(1, len(order) + 1)):
-            raise
-        if not (fault := _fault(table, order)):
-            raise
-        raise Refused(_WHERE, order, fault, _remedy(table, order)) from None
-
-
-def order_warnings(table: EngineTable, parts: Sequence[SliderCrank]) -> tuple[Complaint, ...]:
-    """Return a warning about a firing order that its crank allows, but that other numbers of the cylinders explain."""
+def _remedied(table: EngineTable, complaint: Complaint) -> Complaint:
     order = table.listed_order
+    is_order = complaint.where == _WHERE and table.kind.takes("numbering") and not table.firing_intervals
+    if order is None or not is_order or sorted(order) != list(range(1, len(order) + 1)):
+        return complaint
+    fault = _fault(table, order)
+    return Complaint(_WHERE, value_text(order), fault, _remedy(table, order)) if fault else complaint
+
+
+def _warnings(table: EngineTable, problem: Problem) -> tuple[Complaint, ...]:
+    """Return a warning about a firing order that its crank allows, but that other numbers of the cylinders explain."""
+    if problem.phasing is not None:
+        return ()
+    order, parts = table.listed_order, problem.engine.slider_cranks
     is_usual = order is not None and len(order) >= 3 and table.kind.takes("numbering") and not idle_cylinders(table)
     if order is None or not is_usual or table.firing_intervals:
         return ()
@@ -261,3 +258,6 @@ def _pairs(pairs: Iterable[Pair]) -> str:
 
 def _text(order: Iterable[int]) -> str:
     return "-".join(map(str, order))
+
+
+ADVICE = Advice("firing orders", about_file=_warnings, remedied=_remedied)

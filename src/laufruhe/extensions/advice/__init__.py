@@ -1,0 +1,6 @@
+"""Advice about a file: numbers to check, and the numbering that fits a firing order."""
+
+from laufruhe.extension import Extension
+
+_HERE = "laufruhe.extensions.advice"
+EXTENSION = Extension("advice", advice=(f"{_HERE}.plausibility:ADVICE", f"{_HERE}.firing_orders:ADVICE"))
