@@ -116,13 +116,14 @@ class GaugePressureError(UnitError):
 
     Attributes
     ----------
-    absolute
-        Rule and remedy for a key that is an absolute pressure.
+    absolute, mean
+        Rule and remedy for a key that is an absolute pressure, and for one that is a mean effective pressure.
     """
 
     def __init__(self, absolute: str, mean: str) -> None:
         super().__init__(f"{absolute}, or {mean} for a mean pressure")
         self.absolute = absolute
+        self.mean = f"is a gauge pressure, and a mean effective pressure counts from no other; write {mean}"
 
 
 @cache

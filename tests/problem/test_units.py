@@ -7,6 +7,7 @@ import math
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -176,12 +177,22 @@ class TestParse:
             parse(text, "Pa")
         assert str(caught.value) == said
 
-    @pytest.mark.parametrize(("key", "is_mean"), [("imep", True), ("peak_pressure", False), ("intake_pressure", False)])
-    def test_marks_of_gauges_suggest_a_mean_pressure_where_the_key_is_one(self, key: str, is_mean: bool) -> None:
+    @pytest.mark.parametrize(
+        ("tables", "is_mean"),
+        [
+            ({"operating_points": [{"speed": "900 rpm", "imep": "100 psig"}]}, True),
+            ({"friction": {"fmep": "100 psig"}}, True),
+            ({"operating_points": [{"speed": "900 rpm", "peak_pressure": "100 psig"}]}, False),
+        ],
+    )
+    def test_marks_of_gauges_suggest_a_mean_pressure_where_the_key_is_one(
+        self, tables: dict[str, Any], is_mean: bool
+    ) -> None:
         with pytest.raises(InputError) as caught:
-            load_tables({**tomllib.loads(FOUR), "operating_points": [{"speed": "900 rpm", key: "100 psig"}]}, Path("f"))
-        assert '"100 psig": is a gauge pressure, above that of the air; write "7.908 bar"' in str(caught.value)
-        assert ('or "100 psi" for a mean pressure' in str(caught.value)) is is_mean
+            load_tables({**tomllib.loads(FOUR), **tables}, Path("f"))
+        mean = '"100 psig": is a gauge pressure, and a mean effective pressure counts from no other; write "100 psi"'
+        absolute = '"100 psig": is a gauge pressure, above that of the air; write "7.908 bar"'
+        assert (mean if is_mean else absolute) in str(caught.value)
 
     def test_plain_numbers_are_shown_as_a_file_has_them(self) -> None:
         """Without quotes, and without a unit that they have not."""

@@ -296,6 +296,9 @@ def test_direction_weights_of_the_objective_are_in_the_headline() -> None:
     """Weights w along z on a single: the best balance factor is w^2 / (1 + w^2), from k^2 + w^2 (1 - k)^2."""
     result = laufruhe.solve(_OPEN_FACTOR.replace('force" }', 'force", direction_weights = [1, 1, 2] }'))
     assert headline(result).startswith("RMS shaking force with direction weights 1, 1, 2 falls from")
+    # comparisons and files name the objective too
+    assert result.objective is not None
+    assert result.objective.name == "rms shaking force with direction weights 1, 1, 2"
     (factor,) = result.decisions
     assert factor.value == pytest.approx(0.8, abs=1e-6)
 

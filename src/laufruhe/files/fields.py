@@ -91,6 +91,8 @@ class Number:
         Factor that turns a bare number into SI, if bare numbers are allowed (degrees).
     closed
         Reason why the number may never be open, as the end of a sentence "it ..."; empty if it may be open.
+    is_mean
+        True for a mean effective pressure, which is no pressure of a gas.
     """
 
     unit: str
@@ -101,6 +103,7 @@ class Number:
     below: float = math.inf
     plain: float | None = None
     closed: str = ""
+    is_mean: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -138,8 +141,7 @@ class Number:
             try:
                 return units.parse(raw, self.unit)
             except units.GaugePressureError as error:
-                # absolute pressures are positive, mean pressures may be negative
-                raise refusal(error.absolute if self.above == 0.0 else str(error)) from None
+                raise refusal(error.mean if self.is_mean else error.absolute) from None
             except units.UnitError as error:
                 raise refusal(_without_note(raw) or str(error)) from None
         if self.unit and self.plain is None:
@@ -280,12 +282,13 @@ PositiveMass: TypeAlias = Annotated[float, Number("kg", above=0.0)]
 Inertia: TypeAlias = Annotated[float, Number("kg m^2")]
 OpenInertia: TypeAlias = Annotated[float | Open, Number("kg m^2", above=0.0, openable=True)]
 Density: TypeAlias = Annotated[float, Number("kg/m^3", above=0.0)]
-Pressure: TypeAlias = Annotated[float, Number("Pa")]
+MeanPressure: TypeAlias = Annotated[float, Number("Pa", is_mean=True)]
+PositiveMeanPressure: TypeAlias = Annotated[float, Number("Pa", above=0.0, is_mean=True)]
 PositivePressure: TypeAlias = Annotated[float, Number("Pa", above=0.0)]
 Moment: TypeAlias = Annotated[float, Number("N m")]
 SignedForce: TypeAlias = Annotated[float, Number("N")]
 Factor: TypeAlias = Annotated[float, Number("", minimum=-1000.0, maximum=1000.0)]
-NonNegativePressure: TypeAlias = Annotated[float, Number("Pa", minimum=0.0)]
+NonNegativeMeanPressure: TypeAlias = Annotated[float, Number("Pa", minimum=0.0, is_mean=True)]
 NonNegativeTorque: TypeAlias = Annotated[float, Number("N m", minimum=0.0)]
 Angle: TypeAlias = Annotated[float, Number("rad", plain=_DEG)]
 OpenAngle: TypeAlias = Annotated[float | Open, Number("rad", plain=_DEG, openable=True)]

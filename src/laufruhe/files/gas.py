@@ -95,7 +95,7 @@ class SingleGasTable(Table):
     cylinders: Annotated[list[f.CylinderNumber], f.ListOrSingle(f.CylinderNumber), Field(min_length=1)] = f.required(
         "Their numbers."
     )
-    imep: f.Pressure | None = f.optional("Indicated mean effective pressure of these cylinders.")
+    imep: f.MeanPressure | None = f.optional("Indicated mean effective pressure of these cylinders.")
     peak_pressure: f.PositivePressure | None = f.optional("Peak pressure of these cylinders, with model seiliger.")
     compression_ratio: f.Positive | None = None
 
@@ -125,7 +125,7 @@ class SeiligerTable(ChargeTable, FiredTable):
     makes: ClassVar = Seiliger
     model: Literal["seiliger"]
     peak_pressure: f.PositivePressure
-    imep: f.Pressure | None = f.optional(
+    imep: f.MeanPressure | None = f.optional(
         "Indicated mean effective pressure; needed unless every operating point has a load of its own."
     )
     compression_exponent: f.Positive | None = None
@@ -137,7 +137,7 @@ class WiebeTable(ChargeTable, FiredTable):
 
     makes: ClassVar = Wiebe
     model: Literal["wiebe"]
-    imep: f.Pressure | None = f.optional(
+    imep: f.MeanPressure | None = f.optional(
         "Indicated mean effective pressure; needed unless every operating point has a load of its own."
     )
     start: f.Angle

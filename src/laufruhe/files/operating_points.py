@@ -47,7 +47,9 @@ class OperatingPointTable(StateTable):
     name: Name | None = None
     speed: f.Speed | None = None
     mean_piston_speed: f.PistonSpeed | None = None
-    imep: f.Pressure | None = f.optional("Indicated mean effective pressure at this point, in place of that of [gas].")
+    imep: f.MeanPressure | None = f.optional(
+        "Indicated mean effective pressure at this point, in place of that of [gas]."
+    )
     peak_pressure: f.PositivePressure | None = f.optional("Peak pressure at this point, in place of that of [gas].")
     intake_pressure: f.PositivePressure | None = f.optional(
         "Absolute pressure in the manifold at this point, in place of that of [gas]; 0.3 to 0.5 bar in a throttled "
@@ -57,7 +59,7 @@ class OperatingPointTable(StateTable):
         "File of the pressure recorded at this point, read as that of [gas] with model trace; or a table with the file "
         "and with keys in place of those of [gas], such as angle_zero."
     )
-    bmep: f.NonNegativePressure | None = f.optional(
+    bmep: f.NonNegativeMeanPressure | None = f.optional(
         "Brake mean effective pressure, 0 at idle; [friction] adds what friction takes, and its uncertainty. With a "
         "recorded pressure friction is the difference to its imep."
     )
@@ -78,8 +80,8 @@ class FrictionTable(Table):
     kind: Literal["fuel", "motoring"] = "fuel"
     speed_unit: str = "rpm"
     load_unit: str = f.optional("Unit of the load in the file: of a torque, or of a mean pressure.", "N m")
-    fmep: f.PositivePressure | None = f.optional("Friction mean effective pressure, in place of a file.")
-    deviation: f.NonNegativePressure | None = f.optional("Standard deviation of fmep.")
+    fmep: f.PositiveMeanPressure | None = f.optional("Friction mean effective pressure, in place of a file.")
+    deviation: f.NonNegativeMeanPressure | None = f.optional("Standard deviation of fmep.")
     deviations: f.NonNegative = f.optional(
         "Number of standard deviations to either side for which the load is computed.", 2.0
     )

@@ -35,6 +35,8 @@ class Measure(MeasureQuery):
         """Name in reports."""
         part = "alternating " if self.alternating else ""
         text = f"{self.norm.name} {part}{self.channel}" if self.is_load else str(self.channel)
+        if self.direction_weights is not None:
+            text += " with direction weights " + ", ".join(f"{weight:g}" for weight in self.direction_weights)
         if self.orders is not None:
             text += " of order " + ", ".join(f"{order:g}" for order in self.orders)
         narrowed = {" of ": self.motions, " on ": self.at, " at ": self.points, " under ": self.cases}

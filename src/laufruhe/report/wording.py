@@ -35,10 +35,6 @@ def headline(result: Result) -> str:
     if o is None:
         return "The initial design was evaluated; there is no objective."
     name = f"RMS{o.name[3:]}" if o.name.startswith("rms ") else o.name[:1].upper() + o.name[1:]
-    weights = [term.measure.direction_weights for term in result.problem.objective]
-    if any(weights):
-        values = ", ".join(f"{weight:g}" for weight in weights[0] or ())
-        name += f" with direction weights{f' {values}' if len(set(weights)) == 1 else ''}"
     if not is_changed(result):
         return f"{name} of the initial design: {figure(o.value, o.unit)}."
     if math.isinf(o.initial):
