@@ -166,10 +166,11 @@ class SkipFirePart(Part):
     def table(data: xr.Dataset) -> list[Text]:
         """Return, for every comparison, what is proven and a table of patterns."""
         texts: list[Text] = []
-        named = list(zip(data["measure"].values, data["measure_unit"].values, strict=True))
-        heads = [f"{name} [{units.readable(unit)[0]}]" if unit else str(name) for name, unit in named]
-        factors = np.array([units.readable(unit)[1] for _, unit in named])
         for title, rows in _comparisons_in(data):
+            shown = [units.readable(str(unit)) for unit in rows["measure_unit"].values]
+            names = zip(rows["measure"].values, shown, strict=True)
+            heads = [f"{name} [{unit}]" if unit else str(name) for name, (unit, _) in names]
+            factors = np.array([factor for _, factor in shown])
             values, first = rows["value"].values * factors, rows.isel(point=0)
             ends = [number(value) for value in (*values[[0, -1], 0], float(first["all_fire"]) * factors[0])]
             texts.append(
@@ -189,19 +190,16 @@ class SkipFirePart(Part):
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
         """Draw the torque and the orders of the smoothest and the worst pattern of the first comparisons."""
-        panels, (unit, factor) = list[p.Panel](), units.readable(str(data["measure_unit"].values[0]))
-        orders = data["order"].values[1:]
+        panels = list[p.Panel]()
         for title, rows in _comparisons_in(data)[:DRAWN]:
+            orders, (unit, factor) = rows["order"].values[1:], units.readable(str(rows["measure_unit"].values[0]))
             torques, sizes, patterns = list[p.Mark](), list[p.Mark](), rows["pattern"].values[[0, -1]]
-            for k, colour, word, width in (
-                (-1, "before", "worst pattern", 0.2),
-                (0, "after", "smoothest pattern", 0.1),
-            ):
+            for k, colour, word in ((-1, "before", "worst pattern"), (0, "after", "smoothest pattern")):
                 row, label = rows.isel(point=k), "" if panels else word
-                torques.append(p.Line(data["angle"].values, row["torque"].values, colour, label))
-                sizes.append(p.Bars(orders, factor * row["amplitude"].values[1:], width, colour))
-            words = f"{title}: {patterns[0]}, worst {patterns[1]}"
-            panels.append(p.Panel(torques, p.Axis("crank angle [deg]"), p.Axis("crank torque [N m]"), words))
+                torques.append(p.Line(rows["angle"].values, row["torque"].values, colour, label))
+                sizes.append(p.Bars(orders, factor * row["amplitude"].values[1:], 0.1 if k == 0 else 0.2, colour))
+            panels.append(p.Panel(torques, p.Axis("crank angle [deg]"), p.Axis("crank torque [N m]"),
+                                  f"{title}: {patterns[0]}, worst {patterns[1]}"))  # fmt: skip
             panels.append(p.Panel(sizes, p.Axis("order of crank speed"), p.Axis(f"amplitude [{unit or 'N m'}]")))
         words = f"Torque of the smoothest and the worst pattern, and orders. Measure: {data['measure'].values[0]}."
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), (4.2, 2.4), 2, 0.7)
@@ -216,7 +214,7 @@ def _compare(model: FiringModel, measures: list[Measure], length: int, firings: 
     # other patterns, such as mirrored ones, have equal values but for rounding
     rounded = {pattern: float(f"{value:.9g}") for pattern, value in values.items()}
     classes = [list(alike) for _, alike in groupby(sorted(values, key=rounded.__getitem__), rounded.__getitem__)]
-    rows = []
+    rows, all_fire = [], model.evaluation("1").value(measures[0])
     for alike in classes[:LISTED] + classes[LISTED:][-1:]:
         pattern, cycles = max(alike), math.ceil(length / count)
         design, torque, fires = model.evaluation(pattern), model.crank_torque(pattern), pattern * (model.cycles * count)
@@ -224,10 +222,10 @@ def _compare(model: FiringModel, measures: list[Measure], length: int, firings: 
         curve = np.resize(torque.sample(STEPS * round(torque.period / math.tau)), STEPS * turns * cycles)
         states = {one.name.removeprefix("cylinder "): {*fires[k::count]} for k, one in enumerate(model.opportunities)}
         fixed = ", ".join(name for name, state in states.items() if state == {"1"})
-        is_fixed = all(len(state) == 1 for state in states.values())
+        is_fixed = 0 < firings < length and all(len(state) == 1 for state in states.values())
         rows.append({
             "opportunities": length, "firings": firings, "compared": math.comb(length, firings),
-            "different": len(values), "all_fire": model.evaluation("1").value(measures[0]), "pattern": pattern,
+            "different": len(values), "all_fire": all_fire, "pattern": pattern,
             "alike": len(alike), "mean_torque": float(torque.coefficients[0].real),
             "remark": "; ".join(["even"] * is_even(pattern) + [f"only cylinders {fixed}"] * is_fixed),
             "value": {measure.name: design.value(measure) for measure in measures},
@@ -250,6 +248,10 @@ def _signal(measure: Measure, design: Evaluation) -> Spectrum:
 def _comparisons_in(data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
     keys = list(zip(*(data[key].values.tolist() for key in ("case", "opportunities", "firings")), strict=True))
     return [
-        (f"{key[0]}, {key[2]} firings of {key[1]}", data.isel(point=[k for k, at in enumerate(keys) if at == key]))
+        (
+            f"{key[0]}, {key[2]} firings of {key[1]}",
+            # cases may have different measures
+            data.isel(point=[k for k, at in enumerate(keys) if at == key]).dropna("measure", subset=["value"]),
+        )
         for key in dict.fromkeys(keys)
     ]
