@@ -167,10 +167,10 @@ class SkipFirePart(Part):
         """Return, for every comparison, what is proven and a table of patterns."""
         texts: list[Text] = []
         for title, rows in _comparisons_in(data):
-            shown = [units.readable(str(unit)) for unit in rows["measure_unit"].values]
-            names = zip(rows["measure"].values, shown, strict=True)
+            scales = [units.readable(str(unit)) for unit in rows["measure_unit"].values]
+            names = zip(rows["measure"].values, scales, strict=True)
             heads = [f"{name} [{unit}]" if unit else str(name) for name, (unit, _) in names]
-            factors = np.array([factor for _, factor in shown])
+            factors = np.array([factor for _, factor in scales])
             values, first = rows["value"].values * factors, rows.isel(point=0)
             ends = [number(value) for value in (*values[[0, -1], 0], float(first["all_fire"]) * factors[0])]
             texts.append(
