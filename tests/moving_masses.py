@@ -78,3 +78,24 @@ def roll(masses: list[Mass], speed: float) -> NDArray[np.float64]:
         own = force([each], speed)
         total += each.path.imag * own.real - each.path.real * own.imag
     return total
+
+
+def rigid(mass: float, inertia: float, x: float, centre: Complex, direction: Complex) -> list[Mass]:
+    """A body as two half masses on a line through its centre of gravity that turns with it."""
+    arm = np.sqrt(inertia / mass) * direction / np.abs(direction)
+    return [Mass(0.5 * mass, x, centre + arm), Mass(0.5 * mass, x, centre - arm)]
+
+
+def energy(masses: list[Mass]) -> NDArray[np.float64]:
+    """Kinetic energy at unit speed of the crank, over the period [J s2]."""
+    return sum((0.5 * each.mass * np.abs(differentiated(each.path, times=1)) ** 2 for each in masses), np.zeros(STEPS))
+
+
+def wrench(masses: list[Mass], speed: float) -> NDArray[np.float64]:
+    """On the block of an engine whose crank drives the masses: Fy, Fz, roll moment over the period, shape (3, STEPS).
+
+    The block holds the shaft that takes the energy of the masses.
+    """
+    drive = speed**2 * differentiated(energy(masses).astype(complex), times=1).real
+    total = force(masses, speed)
+    return np.stack([total.imag, total.real, roll(masses, speed) - drive])

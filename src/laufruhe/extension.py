@@ -152,7 +152,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "norms": {"rmq": "root_mean_quad"},
     "layouts": {"rotary": "rotary"},
-    "drives": {"swinging-yoke": "swinging_yoke"},
+    "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")
     | dict.fromkeys(_OF_PISTONS, "piston_motion")

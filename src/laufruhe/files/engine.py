@@ -508,7 +508,8 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             rotating = table.rotating_mass / pins.count((part.shaft, part.x, direction(part.throw)))
         with errors_at_key(where):
             mechanism, _ = _mechanism(table.model_copy(update=overrides))
-            first = (part.bank_angle - part.throw) / carrying_shaft.ratio % (math.tau / abs(carrying_shaft.ratio))
+            centre = part.bank_angle - part.throw + mechanism.part.fires_at
+            first = centre / carrying_shaft.ratio % (math.tau / abs(carrying_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first
             parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, carrying_shaft))
     parts = _in_order(table, parts)

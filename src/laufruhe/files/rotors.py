@@ -134,7 +134,7 @@ def counterweights(
             raise Refused(f"{where}.shaft", table.shaft, "is no shaft with throws", nearest(table.shaft, names))
         if table.factor_key is not None:
             if not all(part.is_balanced_by_share for part in cylinders):
-                rule = "needs pistons on crank pins, and the ram of a swinging yoke moves differently"
+                rule = "needs pistons on crank pins, and this drive moves its pistons or rams differently"
                 raise Refused(f"{where}.{table.factor_key}", None, rule, "give an unbalance or a mass")
             _opposite_throws(table, cylinders, on_shaft, where, into)
         else:

@@ -122,18 +122,8 @@ class ArticulatedCrank(SliderCrank):
         return self._piston(lib, alpha)[0][1]
 
     def _piston(self, lib: Any, alpha: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any]]:
-        """Return piston position with two derivatives along its axis, and rate and acceleration of the rod (K12)."""
-        place, velocity, acceleration = self.knuckle.motion(lib, alpha, self.bank)
-        length = 0.0 * alpha + self.rod_length
-        sine = (place.imag - self.offset) / length
-        cosine = lib.sqrt((1.0 - sine) * (1.0 + sine))
-        rate = velocity.imag / (length * cosine)
-        swing = (acceleration.imag / length + rate * rate * sine) / cosine
-        return (
-            place.real + length * cosine,
-            velocity.real - length * rate * sine,
-            acceleration.real - length * (swing * sine + rate * rate * cosine),
-        ), (-rate, -swing)
+        pin = self.knuckle.motion(lib, alpha, self.bank)
+        return kinematics.piston_on_pin(lib, pin, 0.0 * alpha + self.rod_length, self.offset)
 
     def rod_lean(self, lib: Any, alpha: Any) -> tuple[Any, Any]:
         """Return sine and cosine of the angle chi between rod and cylinder axis (K12)."""

@@ -50,6 +50,6 @@ def balance_factors(engine: Engine) -> tuple[BalanceFactor, ...]:
                 counted[j] |= rotor in weights and rotor.unbalance != 0.0
         for k, throw in enumerate(throws):
             unbalance = sum(part.reciprocating_mass * part.crank_radius for part in throw)
-            if counted[k] and unbalance > 0.0:
+            if counted[k] and unbalance > 0.0 and all(part.is_balanced_by_share for part in throw):
                 factors.append(BalanceFactor(tuple(part.name for part in throw), float(opposite[k] / unbalance)))
     return tuple(factors)

@@ -90,7 +90,7 @@ def _unit_motion(part: SliderCrank) -> PistonMotion:
     alpha = part.dead_centres[0] + math.tau / STEPS * np.arange(STEPS)
     _, velocity, acceleration = (np.real(row) + 0.0 * alpha for row in part.motion(np, alpha).points[0][1])
     rod = None
-    if part.has_rod:
+    if part.has_rod and part.rod_ratio > 0.0:
         sine, cosine = part.rod_lean(np, alpha)
         rod = _largest(np.abs(np.arctan2(sine, cosine)))
     return PistonMotion(

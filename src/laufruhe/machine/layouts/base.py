@@ -225,8 +225,11 @@ def _with_dead_centres(layout: Layout, inputs: LayoutInput) -> Layout:
     """Return the layout with the offset and true dead centre of every cylinder, if these differ."""
     mechanisms = [inputs.at_place(place).mechanism for place in range(inputs.cylinders)]
     offsets = layout.offsets or tuple(mechanism.part.offset for mechanism in mechanisms)
-    if layout.firing_delays or not any(offsets):
+    fires = tuple(mechanism.part.fires_at for mechanism in mechanisms)
+    if layout.firing_delays or not any((*offsets, *fires)):
         return layout
+    if any(fires) and not layout.offsets:
+        return replace(layout, firing_delays=fires)
     if any(type(mechanism.part) is not SliderCrank for mechanism in mechanisms):
         if layout.offsets or inputs.single:
             raise KeyedError("offset", "needs a slider-crank if cylinders differ; leave the offset out")
