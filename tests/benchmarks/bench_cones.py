@@ -105,6 +105,13 @@ def main() -> None:
             f"| {size} | {a[0]:.3f} | {b[0]:.3f} | {a[0] / b[0]:.2f} | {a[3]:.0f} | {b[3]:.0f} "
             f"| {a[2]:.0e} | {b[2]:.0e} | {abs(a[1] - b[1]) / b[1]:.0e} |"
         )
+    count, own, other = ready_times()
+    lines.append(f"| {count} ready problems | {own:.2f} | {other:.2f} | {own / other:.2f} | | | | | |")
+    publish(OUT, "\n".join(lines) + "\n")
+
+
+def ready_times() -> tuple[int, float, float]:
+    """Return the number of ready problems and the processor time of both ways, each the least of several runs [s]."""
     problems = ready()
     best = [[math.inf] * len(problems) for _ in WAYS]
     for _ in range(ROUNDS):
@@ -113,8 +120,7 @@ def main() -> None:
                 with way(name):
                     times[k] = min(times[k], decided(problem, model)[0])
     own, other = (sum(times) for times in best)
-    lines.append(f"| {len(problems)} ready problems | {own:.2f} | {other:.2f} | {own / other:.2f} | | | | | |")
-    publish(OUT, "\n".join(lines) + "\n")
+    return len(problems), own, other
 
 
 def measured(size: str, name: str) -> list[float]:

@@ -9,7 +9,7 @@ import importlib
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -57,6 +57,7 @@ COMPARED = (
     "vee-two-90", "vee-six-60", "vee-eight-cross", "tractor-single-shafts",
 )  # fmt: skip
 WORDS = {"evaluation": "evaluate", "solve": "solve", "scene": "scene of a sweep", "batch": "10,000 designs"}
+AUTO = {"kinematics": "auto", "tolerance": 1e-3}
 ROUNDS = 3
 LEAST, BEYOND = 1e-8, 20.0
 """What is under it is drawn at it; and where designs beyond a limit are."""
@@ -110,6 +111,14 @@ def separate_calls() -> list[str]:
         "| problem | call | trade | separate call | ratio |",
         "| --- | --- | ---: | ---: | ---: |",
     ]
+    for name, call, price, alone in call_times():
+        cells = f"{1e3 * price:.2f} ms | {1e3 * alone:.2f} ms | {price / alone:.2f}"
+        lines.append(f"| {name} | {WORDS[call]} | {cells} |")
+    return [*lines, ""]
+
+
+def call_times() -> Iterator[tuple[str, str, float, float]]:
+    """Yield problem, call, its processor time by the trade and that of the public call alone [s]."""
     for name in COMPARED:
         problem = laufruhe.load(PROBLEMS / f"{name}.toml")
         scale, batch = Reference(problem), Batch(problem)
@@ -117,7 +126,7 @@ def separate_calls() -> list[str]:
         calls: dict[str, Callable[[], float]] = {
             "evaluation": lambda own=variant: min(spent(lambda: laufruhe.evaluate(own)) for _ in range(30)),
             "solve": lambda own=variant: min(spent(lambda: laufruhe.solve(own)) for _ in range(3)),
-            "scene": lambda own=problem: _scene_of_study(own),
+            "scene": lambda own=problem: scene_time(own),
             "batch": lambda own=variant, b=batch: min(
                 spent(lambda: laufruhe.evaluate_many(own, b.columns)) for _ in range(3)
             ),
@@ -126,17 +135,13 @@ def separate_calls() -> list[str]:
             (measured("auto 0.001", variant, scale, batch), {call: work() for call, work in calls.items()})
             for _ in range(ROUNDS)
         ]
-        for call, words in WORDS.items():
-            price, alone = min(getattr(row, call) for row, _ in rounds), min(times[call] for _, times in rounds)
-            cells = f"{1e3 * price:.2f} ms | {1e3 * alone:.2f} ms | {price / alone:.2f}"
-            lines.append(f"| {name} | {words} | {cells} |")
-    return [*lines, ""]
+        for call in WORDS:
+            yield name, call, min(getattr(row, call) for row, _ in rounds), min(times[call] for _, times in rounds)
 
 
-def _scene_of_study(problem: Problem) -> float:
-    """Processor time of a scene in a study of the public call at fidelity `auto 0.001` [s]."""
-    tables = dict(problem.origin.tables)
-    tables["fidelity"] = {"kinematics": "auto", "tolerance": 1e-3}
+def scene_time(problem: Problem, fidelity: Mapping[str, Any] = AUTO) -> float:
+    """Return the processor time of a scene in a study of the public call at a fidelity [s]."""
+    tables = {**problem.origin.tables, "fidelity": fidelity}
     (key,) = {"speed", "mean_piston_speed"} & tables["operating_points"][0].keys()
     number, unit = str(tables["operating_points"][0][key]).split()
 
