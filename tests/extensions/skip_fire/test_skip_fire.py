@@ -220,8 +220,16 @@ BAD = [
         'opportunities = [4]\ndemands = ["1/2"]\nmeasures = [{ quantity = "rms crank torque" }]',
         "does not follow",
     ),
-    (MISFIRE, 'opportunities = [4]\ndemands = ["1/2"]\nmeasures = [{ quantity = "rms rod force" }]', "does not follow"),
-    (VEE, 'opportunities = [4]\ndemands = ["1/2"]\nmeasures = [{ quantity = "added mass" }]', "does not follow"),
+    (
+        MISFIRE,
+        'opportunities = [4]\ndemands = ["1/2"]\nmeasures = [{ quantity = "rms rod force" }]',
+        "does not follow from its torque",
+    ),
+    (
+        VEE,
+        'opportunities = [4]\ndemands = ["1/2"]\nmeasures = [{ quantity = "added mass" }]',
+        "does not follow from its torque",
+    ),
     (PROBLEMS / "rotary-two.toml", 'opportunities = [4]\ndemands = ["1/2"]', "rotary"),
     (PROBLEMS / "klein-steam-pump.toml", 'opportunities = [4]\ndemands = ["1/2"]', "needs [gas] with model seiliger"),
     (PROBLEMS / "inline-five-open.toml", 'opportunities = [5]\ndemands = ["1/5"]', "needs [gas] with model seiliger"),

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from laufruhe import units
+from laufruhe.errors import plural
 from laufruhe.extensions.skip_fire.patterns import count_patterns, is_even, patterns
 from laufruhe.extensions.skip_fire.torque import FiringModel
 from laufruhe.files import fields as f
@@ -107,7 +108,7 @@ class SkipFirePart(Part):
             # firings of all cylinders have the loads of the engine, and others than no firing
             value = every.value(measure)
             if not math.isclose(value, whole.value(measure), rel_tol=1e-6) or value == none.value(measure):
-                rule = f"has a {measure.name} that does not follow the torque of a firing pattern"
+                rule = f"has no {measure.name} of a firing pattern, which does not follow from its torque"
                 remedy = "name a measure of roll moment, mounts, receivers, stored work or irregularity"
                 raise problem_files.refused(case, "engine", rule, remedy)
         idle, full = (float(model.crank_torque(pattern).coefficients[0].real) for pattern in "01")
@@ -221,13 +222,15 @@ def _compare(model: FiringModel, measures: list[Measure], length: int, firings: 
         signal = _signal(measures[0], design).truncated(2 * count / turns)
         curve = np.resize(torque.sample(STEPS * round(torque.period / math.tau)), STEPS * turns * cycles)
         states = {one.name.removeprefix("cylinder "): {*fires[k::count]} for k, one in enumerate(model.opportunities)}
-        fixed = ", ".join(name for name, state in states.items() if state == {"1"})
+        fixed = [name for name, state in states.items() if state == {"1"}]
         is_fixed = 0 < firings < length and all(len(state) == 1 for state in states.values())
+        remarks = ["even"] * is_even(pattern)
+        remarks += [f"only {plural('cylinder', len(fixed))} {', '.join(fixed)}"] * is_fixed
         rows.append({
             "opportunities": length, "firings": firings, "compared": math.comb(length, firings),
             "different": len(values), "all_fire": all_fire, "pattern": pattern,
             "alike": len(alike), "mean_torque": float(torque.coefficients[0].real),
-            "remark": "; ".join(["even"] * is_even(pattern) + [f"only cylinders {fixed}"] * is_fixed),
+            "remark": "; ".join(remarks),
             "value": {measure.name: design.value(measure) for measure in measures},
             "torque": {f"{360.0 * k / STEPS:g}": value for k, value in enumerate(curve.tolist())},
             "amplitude": {
