@@ -141,7 +141,7 @@ def test_results_have_the_card() -> None:
     [
         (END.replace("0.5", "50"), 'balance_factor = 50: must be at most 1; give a smaller value, or "50 %"'),
         ("balance_factor = 0.5", "bob_weights.big_end: is missing"),
-        (END.replace('"1 kg"', '["1 kg", "1 kg"]'), "big_end: has 2 entries, and the engine has 4"),
+        (END.replace('"1 kg"', '["1 kg", "1 kg"]'), "big_end: has 2 entries for 4 rods"),
         (f'{END}piston = "1 kg"', "bob_weights.small_end: is missing, and piston is given"),
         (END.replace('"1 kg"', '{ between = ["1 kg", "2 kg"] }'), "bob_weights.big_end"),
     ],

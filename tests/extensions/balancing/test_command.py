@@ -122,6 +122,20 @@ def test_a_rotor_within_its_grade_needs_no_hole(folder: Path) -> None:
     assert "No hole is needed: the unbalance of both planes is permitted." in result.stdout
 
 
+def test_masses_of_one_pin_need_no_engine(folder: Path) -> None:
+    """Two rods on a pin: 2 x 0.3 kg in full, and 0.6 of 0.5 + 0.52 + 2 x 0.2 kg."""
+    text = 'title = "Twin"\n[bob_weights]\nbalance_factor = 0.6\npiston = ["500 g", "520 g"]\nbig_end = "300 g"\n'
+    (folder / "twin.toml").write_text(text + 'small_end = "200 g"\n', encoding="utf-8")
+    result = run("twin.toml")
+    assert result.exit_code == 0, result.stderr
+    card = (folder / "results" / "twin-balance" / "bob-weights.csv").read_text(encoding="utf-8")
+    assert card.splitlines()[-1] == "bob weight,,1452.0"
+    (folder / "twin.toml").write_text(text, encoding="utf-8")
+    assert "bob_weights.small_end: is missing" in run("twin.toml").stderr
+    (folder / "twin.toml").write_text(text.replace("piston", "#"), encoding="utf-8")
+    assert "without [engine] there is no reciprocating mass; add piston and small_end" in run("twin.toml").stderr
+
+
 @pytest.mark.parametrize(
     ("wall", "note"),
     [

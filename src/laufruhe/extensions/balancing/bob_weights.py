@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -52,28 +52,31 @@ class BobWeights(Extra):
         throws = tuple((cylinders, mass * one) for cylinders, one in self.throw_masses)
         return replace(super().scaled(length, mass), throw_masses=throws)
 
-    def shares(self, engine: Engine, pin: int) -> Mapping[str, tuple[float, float]]:
+    def shares(self, engine: Engine | None, pin: int) -> Mapping[str, tuple[float, float]]:
         """Return the mass of each part on a crank pin [kg], and the share of it that the bob weight has (U1).
 
         Without weighed pistons the engine has the reciprocating mass.
         """
         masses = {name: sum(masses[k] for k in self.throws[pin]) for name, masses in self.parts}
-        if not masses.keys() & set(RECIPROCATING):
+        if engine is not None and not masses.keys() & set(RECIPROCATING):
             masses[ENGINE_MASS] = sum(engine.slider_cranks[k].reciprocating_mass for k in self.throws[pin])
         shares = {name: (mass, 1.0 if name in ROTATING else self.factor) for name, mass in masses.items()}
         return {**shares, "oil": (self.oil, 1.0)}
 
-    def mass(self, engine: Engine, pin: int) -> float:
+    def mass(self, engine: Engine | None, pin: int) -> float:
         """Return the bob weight of a crank pin [kg] (U1)."""
         return sum(mass * part for mass, part in self.shares(engine, pin).values())
 
 
-def card(engine: Engine, weights: BobWeights) -> Table:
-    """Return the card of bob weights, with a column for every crank pin, or one for all if they are equal."""
+def card(engine: Engine | None, weights: BobWeights) -> Table:
+    """Return the card of bob weights, with a column for every crank pin, or one for all if they are equal.
+
+    Without an engine it has no unbalance, because the crank radius is not known.
+    """
     throws = [weights.shares(engine, k) for k in range(len(weights.throws))]
-    radii = [engine.slider_cranks[on_pin[0]].crank_radius for on_pin in weights.throws]
-    names = [", ".join(engine.slider_cranks[i].name for i in on_pin) for on_pin in weights.throws]
-    if all(pair == (throws[0], radii[0]) for pair in zip(throws, radii, strict=True)):
+    radii = [engine.slider_cranks[on_pin[0]].crank_radius if engine else 0.0 for on_pin in weights.throws]
+    names = [", ".join(_rods(engine, on_pin)) for on_pin in weights.throws]
+    if engine and all(pair == (throws[0], radii[0]) for pair in zip(throws, radii, strict=True)):
         names, throws, radii = [f"each of {counted(len(throws), 'crank pin')}"], throws[:1], radii[:1]
     columns = {name: [shares[name] for shares in throws] for name in throws[0]}
     totals = [weights.mass(engine, k) for k in range(len(throws))]
@@ -85,14 +88,19 @@ def card(engine: Engine, weights: BobWeights) -> Table:
         if any(mass for mass, _ in cells)
     ]
     rows.append(["bob weight", "", *(aligned(grams * mass, largest) for mass in totals)])
-    rows.append(
-        [f"unbalance [{unbalance}]", "", *(number(size * m * r, 5) for m, r in zip(totals, radii, strict=True))]
-    )
     note = (
         "On a crank pin, all rods of the pin counted: rotating masses and oil in full, reciprocating masses with "
-        f"the balance factor. The unbalance is that at the crank radius.{_difference(engine, weights)}"
+        "the balance factor."
     )
+    if engine:
+        cells = [number(size * m * r, 5) for m, r in zip(totals, radii, strict=True)]
+        rows.append([f"unbalance [{unbalance}]", "", *cells])
+        note += f" The unbalance is that at the crank radius.{_difference(engine, weights)}"
     return Table((f"part [{unit}]", "share", *names), rows, title="Bob weights", note=note, file=CARD)
+
+
+def _rods(engine: Engine | None, on_pin: Sequence[int]) -> list[str]:
+    return [engine.slider_cranks[k].name if engine else f"rod {k + 1}" for k in on_pin]
 
 
 def _difference(engine: Engine, weights: BobWeights) -> str:
@@ -126,12 +134,12 @@ def _difference(engine: Engine, weights: BobWeights) -> str:
     )
 
 
-def record(engine: Engine, weights: BobWeights) -> Mapping[str, Any]:
+def record(engine: Engine | None, weights: BobWeights) -> Mapping[str, Any]:
     """Return the bob weights for JSON [kg]."""
     return {
         "balance_factor": weights.factor,
         "throws": [
-            {"cylinders": [engine.slider_cranks[i].name for i in on_pin], "bob_weight": weights.mass(engine, k),
+            {"cylinders": _rods(engine, on_pin), "bob_weight": weights.mass(engine, k),
              "parts": {name: {"mass": mass, "share": part} for name, (mass, part) in weights.shares(engine, k).items()}}
             for k, on_pin in enumerate(weights.throws)
         ],

@@ -1,4 +1,4 @@
-"""[bob_weights] and [correction] of a problem file, and files with [correction] alone."""
+"""[bob_weights] and [correction] of a problem file, and files with these tables alone."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 from pydantic import Field, ValidationError
 
 from laufruhe import units
-from laufruhe.errors import InputError, refused
-from laufruhe.extensions.balancing.bob_weights import RECIPROCATING, BobWeights
+from laufruhe.errors import InputError, counted, refused
+from laufruhe.extensions.balancing.bob_weights import RECIPROCATING, ROTATING, BobWeights
 from laufruhe.extensions.balancing.physics import Dial, Drilling, Hole, Plane, plane_shares
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, require_distinct, require_one_of
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.problem_file import ExtensionContext, Key, UnitsTable
 from laufruhe.files.reader import display_path, load_tables, tables_of
+from laufruhe.machine import Engine
 from laufruhe.machine.rotor import grade_of, permitted_unbalance
 from laufruhe.numerics.exact_angles import direction
 from laufruhe.problem.problem import Problem
@@ -134,14 +135,15 @@ class CorrectionTable(Table):
 
 
 class CorrectionFile(Table):
-    """File with a correction and without an engine."""
+    """File with a correction or bob weights, and without an engine."""
 
     title: str = Field(min_length=1)
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)
     tolerance: f.Tolerance = 1e-4
     units: UnitsTable = Field(default_factory=UnitsTable)
-    correction: CorrectionTable
+    correction: CorrectionTable | None = None
+    bob_weights: BobWeightsTable | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,13 +179,14 @@ class Correction:
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Balancing job of a file: bob weights of its engine, a correction, or both; `units` are those of its report."""
+    """Balancing job of a file: bob weights, a correction, or both; `units` are those of its report."""
 
     title: str
     source: str
     assumptions: Sequence[str]
     units: Mapping[str, str]
-    problem: Problem | None
+    engine: Engine | None
+    weights: BobWeights | None
     correction: Correction | None
 
 
@@ -193,18 +196,31 @@ def load_job(path: Path) -> Job:
     if not tables.keys() & {"bob_weights", "correction"} and "study" not in tables:
         rule = "is missing, and this file has no [bob_weights] either"
         raise refused("correction", "", rule, "add one of the two tables", source)
-    if tables.keys() & {"engine", "study", "bob_weights"}:
+    if tables.keys() & {"engine", "study"}:
         problem = load_tables(tables, source)
         table = tables.get("correction")
         correction = None if table is None else correction_of(_validated(table), problem.tolerance)
-        return Job(problem.title, problem.source, problem.assumptions, dict(problem.shown_units), problem, correction)
+        engine, chosen = problem.engine, dict(problem.shown_units)
+        weights = engine.extra(BobWeights)
+        return Job(problem.title, problem.source, problem.assumptions, chosen, engine, weights, correction)
     try:
         with errors_in_file(source):
             file = CorrectionFile.model_validate(tables)
-            correction, chosen = correction_of(file.correction, file.tolerance), dict(file.units.by_si_unit())
+            correction = None if file.correction is None else correction_of(file.correction, file.tolerance)
+            weights = None if file.bob_weights is None else _weights_of_a_pin(file.bob_weights)
     except ValidationError as error:
         raise InputError(str(source), complaints_of(error, CorrectionFile)) from None
-    return Job(file.title, file.source, file.assumptions, chosen, None, correction)
+    chosen = dict(file.units.by_si_unit())
+    return Job(file.title, file.source, file.assumptions, chosen, None, weights, correction)
+
+
+def _weights_of_a_pin(table: BobWeightsTable) -> BobWeights:
+    # without an engine, a list has the mass of each rod on a crank pin
+    if table.piston is None:
+        rule = "is missing, and without [engine] there is no reciprocating mass"
+        raise Refused("bob_weights.piston", None, rule, "add piston and small_end")
+    rods = max(len(masses) for name in (*ROTATING, *RECIPROCATING) if (masses := getattr(table, name)) is not None)
+    return BobWeights(table.balance_factor, table.oil, _parts_of(table, rods), (tuple(range(rods)),), ())
 
 
 def _validated(table: Mapping[str, Any]) -> CorrectionTable:
@@ -222,12 +238,6 @@ def _read_bob_weights(table: BobWeightsTable, problem: Problem, context: Extensi
     if any(part.master_bank is not None for part in cranks):
         rule = "needs rods on the crank pins, and these are hinged to a master rod"
         raise Refused("bob_weights", None, rule, "leave it out")
-    listed = [name for name in RECIPROCATING if getattr(table, name) is not None]
-    for name in ("piston", "small_end") if listed else ():
-        if name not in listed:
-            rule = f"is missing, and {listed[0]} is given"
-            raise Refused(f"bob_weights.{name}", None, rule, "add it, or leave all reciprocating parts out")
-    parts = [(name, _masses_of(table, name, len(cranks))) for name in ("big_end", "bearing_shells", *listed)]
     pins = dict[tuple[int, object], list[int]]()
     for k, throw in enumerate(context.throws):
         for i in throw.cylinders:
@@ -236,15 +246,26 @@ def _read_bob_weights(table: BobWeightsTable, problem: Problem, context: Extensi
     masses = tuple(
         (throw.cylinders, abs(throw.unbalance) / cranks[throw.cylinders[0]].crank_radius) for throw in context.throws
     )
-    weights = BobWeights(table.balance_factor, table.oil, tuple(parts), tuple(map(tuple, pins.values())), masses)
+    parts = _parts_of(table, len(cranks))
+    weights = BobWeights(table.balance_factor, table.oil, parts, tuple(map(tuple, pins.values())), masses)
     return replace(problem, engine=problem.engine.with_extra(weights))
+
+
+def _parts_of(table: BobWeightsTable, cylinders: int) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """Return the names of the weighed parts, each with its mass at every cylinder [kg]."""
+    listed = [name for name in RECIPROCATING if getattr(table, name) is not None]
+    for name in ("piston", "small_end") if listed else ():
+        if name not in listed:
+            rule = f"is missing, and {listed[0]} is given"
+            raise Refused(f"bob_weights.{name}", None, rule, "add it, or leave all reciprocating parts out")
+    return tuple((name, _masses_of(table, name, cylinders)) for name in (*ROTATING, *listed))
 
 
 def _masses_of(table: BobWeightsTable, name: str, cylinders: int) -> tuple[float, ...]:
     masses = getattr(table, name) or [0.0]
     if len(masses) not in (1, cylinders):
-        rule = f"has {len(masses)} entries, and the engine has {cylinders} cylinders"
-        raise Refused(f"bob_weights.{name}", None, rule, "give one mass, or one for each cylinder")
+        rule = f"has {len(masses)} entries for {counted(cylinders, 'rod')}"
+        raise Refused(f"bob_weights.{name}", None, rule, "give one mass, or one for each rod")
     return tuple(masses) * (cylinders // len(masses))
 
 

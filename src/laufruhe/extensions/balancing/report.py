@@ -12,7 +12,7 @@ import numpy as np
 
 from laufruhe.cli.screen import Output, typed
 from laufruhe.errors import counted
-from laufruhe.extensions.balancing.bob_weights import CARD, BobWeights, card, record
+from laufruhe.extensions.balancing.bob_weights import CARD, card, record
 from laufruhe.extensions.balancing.file import Correction, Job, load_job
 from laufruhe.extensions.balancing.physics import Drilling, Hole, Plane
 from laufruhe.extensions.balancing.search import WASTE, PlaneResult, correct
@@ -278,8 +278,7 @@ def _count_cells(result: PlaneResult, holes: int, size: float) -> tuple[str, str
 
 
 def _card(job: Job) -> Table | None:
-    weights = None if job.problem is None else job.problem.engine.extra(BobWeights)
-    return None if job.problem is None or weights is None else card(job.problem.engine, weights)
+    return None if job.weights is None else card(job.engine, job.weights)
 
 
 def as_json(job: Job, answer: Balanced | None) -> str:
@@ -294,9 +293,8 @@ def as_json(job: Job, answer: Balanced | None) -> str:
                        zip(answer.planes, answer.correction.gaps, strict=True)],
             "holes": _hole_records(answer),
         }  # fmt: skip
-    weights = None if job.problem is None else job.problem.engine.extra(BobWeights)
-    if job.problem is not None and weights is not None:
-        content["bob_weights"] = record(job.problem.engine, weights)
+    if job.weights is not None:
+        content["bob_weights"] = record(job.engine, job.weights)
     return strict(content)
 
 
