@@ -178,7 +178,7 @@ PLANE = "correction.planes[1]"
         ('depth_step = "1 mm"', 'depth_step = "0.01 mm"', "correction.max_holes = 4: makes too many designs to prove"),
         ('drills = ["8 mm", "10 mm"]', "drills = []", "correction.drills"),
         ('max_depth = "12 mm"', 'max_depth = { between = ["8 mm", "12 mm"] }', "correction.max_depth"),
-        ('title = "Disc"', 'title = "Disc"\n[bob_weights]', "engine: is missing"),
+        ('title = "Disc"', 'title = "Disc"\n[bob_weights]', "bob_weights.big_end: is missing"),
         ('title = "Disc"', 'title = "Disc"\n[study]', "use laufruhe study"),
     ],
 )  # fmt: skip

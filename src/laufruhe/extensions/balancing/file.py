@@ -252,7 +252,7 @@ def _read_bob_weights(table: BobWeightsTable, problem: Problem, context: Extensi
 
 
 def _parts_of(table: BobWeightsTable, cylinders: int) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Return the names of the weighed parts, each with its mass at every cylinder [kg]."""
+    # names of the weighed parts, each with its mass at every cylinder [kg]
     listed = [name for name in RECIPROCATING if getattr(table, name) is not None]
     for name in ("piston", "small_end") if listed else ():
         if name not in listed:
