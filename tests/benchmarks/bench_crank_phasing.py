@@ -35,10 +35,9 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
-from laufruhe.solvers.stars.cut_search import search_designs
-from laufruhe.solvers.stars.enumeration import enumerate_stars
+from laufruhe.solvers.stars.even_search import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.star_program import solve_design
+from laufruhe.solvers.stars.star_program import search_designs, solve_design
 
 OUT = PAGES / "crank-phasing.md"
 RANKED = (

@@ -24,8 +24,8 @@ from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.prove.throws.star_cuts import Cut
 from laufruhe.solvers.boxes import places
 from laufruhe.solvers.conclusion import evaluate_design, witness_of
-from laufruhe.solvers.mounts.bounds import mount_numbers
 from laufruhe.solvers.mounts.convex import ConvexProgram
+from laufruhe.solvers.mounts.nonlinear import mount_numbers
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.stars import even_search
 from laufruhe.solvers.throws import uneven_throws

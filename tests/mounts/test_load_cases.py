@@ -24,8 +24,7 @@ from laufruhe.physics.static_cases import case_wrench, settled, stops_of
 from laufruhe.problem.channels import counted_cases, mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_cases import static_loads
-from laufruhe.prove.mounts.box_numbers import LINEAR_BOUNDS
+from laufruhe.prove.mounts.box_numbers import LINEAR_BOUNDS, static_loads
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status

@@ -23,8 +23,14 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import evaluate_design
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.mounts.bounds import bound_search
-from laufruhe.solvers.mounts.nonlinear import _method, _rebalanced, mounts_bound, solve_joint, solve_mounts
+from laufruhe.solvers.mounts.nonlinear import (
+    _method,
+    _rebalanced,
+    bound_search,
+    mounts_bound,
+    solve_joint,
+    solve_mounts,
+)
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.result import Status
@@ -208,7 +214,7 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, t
         assert question.witness.place == pytest.approx([number.real for number in question.good_values])
         return BoxResult(0.9 * value, 3, (np.array(stiffness),) if len(values) == 1 else ())
 
-    monkeypatch.setattr("laufruhe.solvers.mounts.bounds.run_provers", by_provers)
+    monkeypatch.setattr("laufruhe.solvers.mounts.nonlinear.run_provers", by_provers)
     search = ScriptedSearch(problem, [2e5, 2e5])
     given = search.best.design.value
     found = bound_search(problem, search, False)

@@ -19,10 +19,16 @@ from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
 from laufruhe.prove.throws.star_cuts import cut_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars.cut_search import _distinct_values, search_designs
 from laufruhe.solvers.stars.even_search import search_even
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.star_program import SolvedStar, coarse_value, shaft_owners, solve_design
+from laufruhe.solvers.stars.star_program import (
+    SolvedStar,
+    _distinct_values,
+    coarse_value,
+    search_designs,
+    shaft_owners,
+    solve_design,
+)
 from laufruhe.solvers.walk import _change_order
 from phasing import engines
 

@@ -17,7 +17,7 @@ from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars.enumeration import enumerate_stars
+from laufruhe.solvers.stars.even_search import enumerate_stars
 from phasing import engines
 from problem_files import PROBLEMS
 from ready import solved

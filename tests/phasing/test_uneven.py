@@ -19,7 +19,7 @@ from laufruhe.prove.throws.firing_windows_bound import minimum_bound, star_bound
 from laufruhe.solvers import solve
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 from laufruhe.solvers.smooth.program import SmoothProgram
-from laufruhe.solvers.stars.enumeration import enumerate_stars
+from laufruhe.solvers.stars.even_search import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.throws import uneven_throws
 from laufruhe.solvers.throws.uneven_throws import local_optimum

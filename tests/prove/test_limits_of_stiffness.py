@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from laufruhe.prove.mounts.box_lines import LinearRelaxation
+from laufruhe.prove.mounts.box_norms import LinearRelaxation
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of

@@ -17,8 +17,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import counted_rows, lower_bound_of_norm, norm_under
+from laufruhe.prove.mounts.box_norms import LinearRelaxation, counted_rows, lower_bound_of_norm, norm_under
 from laufruhe.prove.mounts.box_numbers import sag, sag_under
 from laufruhe.prove.mounts.box_series import LinearResponse
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_problem, stiffness_bounds

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _FUNCTIONS = {
     "html": "laufruhe.report.notebook:problem_html",
     "affine": "laufruhe.load_models.labelled_rows:labelled_measures",
-    "objective_function": "laufruhe.load_models.objective_function:objective_function",
+    "objective_function": "laufruhe.load_models.labelled_rows:objective_function",
     "to_cvxpy": "laufruhe.solvers.cones.cvxpy_program:program_of",
     "to_casadi": "laufruhe.solvers.smooth.statement:smooth_statement",
     "with_objective": "laufruhe.extensions.own_measures.measures:with_objective",

@@ -34,7 +34,7 @@ from laufruhe.solvers.conclusion import (
     violated_limits,
     without_proof,
 )
-from laufruhe.solvers.cones.equations import refine_multipliers
+from laufruhe.solvers.cones.conic import refine_multipliers
 from laufruhe.solvers.many import columns_of, numbers_of, values_of_columns
 from laufruhe.solvers.methods import solve
 from laufruhe.solvers.prices import affine_prices

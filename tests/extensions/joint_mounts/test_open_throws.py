@@ -14,7 +14,7 @@ import pytest
 import laufruhe
 from attack.own_problem import Own
 from laufruhe.extensions.joint_mounts.load_boxes import LoadBoxes
-from laufruhe.extensions.joint_mounts.open_throws import OpenThrows, along_arcs, throws_at
+from laufruhe.extensions.joint_mounts.mounted_loads import OpenThrows, along_arcs, throws_at
 from laufruhe.problem.phasing import Candidate
 
 INPUT = Path(__file__).parents[2] / "claims" / "inputs" / "uneven-throws-beside-a-stiffness.toml"

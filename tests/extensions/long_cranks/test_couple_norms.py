@@ -17,7 +17,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sam
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.stars.enumeration import enumerate_stars
+from laufruhe.solvers.stars.even_search import enumerate_stars
 from laufruhe.solvers.stars.families import Family, families_of
 from phasing import engines
 

@@ -17,7 +17,7 @@ from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.crank_stars import StarSpace, star_sums
-from laufruhe.solvers.stars.enumeration import enumerate_stars
+from laufruhe.solvers.stars.even_search import enumerate_stars
 
 NONE = (0.0,) * 4
 ORDERS = (1, 2, 3, 4)

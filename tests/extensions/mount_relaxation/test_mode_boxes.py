@@ -8,7 +8,7 @@ import pytest
 from extensions.mount_relaxation.test_dual import spoilt
 from extensions.mount_relaxation.test_spring_bound import powertrain
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Solution
-from laufruhe.extensions.mount_relaxation.modes import ModeConstraints, mode_basis, mode_constraints
+from laufruhe.extensions.mount_relaxation.constraints import ModeConstraints, mode_basis, mode_constraints
 from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
 from laufruhe.extensions.mount_relaxation.program import SdpProgram
 from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound

@@ -15,7 +15,7 @@ from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, with_mounts
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.mounts.bounds import are_contradictory, minimal_conflict
+from laufruhe.solvers.mounts.nonlinear import are_contradictory, minimal_conflict
 
 
 def limits_of(problem: Problem, share: float, seed: int = 0) -> list[dict[str, Any]]:

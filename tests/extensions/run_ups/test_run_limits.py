@@ -24,7 +24,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status
 from laufruhe.solvers.conclusion import values_of
-from laufruhe.solvers.mounts.bounds import are_contradictory
+from laufruhe.solvers.mounts.nonlinear import are_contradictory
 from problem_files import PROBLEMS
 from solvers.test_few_angles import SINGLE, mounted, on_open_mounts, second
 

@@ -11,7 +11,7 @@ import pytest
 
 from laufruhe.extensions.torsion.physics import chain_of, inertias, shaft_torque, throw_torques, twist
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.load_models.firing_model import FiringModel
+from laufruhe.load_models.star_model import FiringModel
 from laufruhe.machine import LoadTorque
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.evaluation import evaluate, objective_value

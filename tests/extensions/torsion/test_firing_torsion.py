@@ -13,13 +13,12 @@ import pytest
 import laufruhe
 from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.load_models.firing_model import FiringModel
-from laufruhe.load_models.pair_tables import PairObjective
+from laufruhe.load_models.star_model import FiringModel, PairObjective
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.stars.enumeration import enumerate_stars
+from laufruhe.solvers.stars.even_search import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
 from problem_files import PROBLEMS
 

@@ -33,8 +33,7 @@ from laufruhe.prove.certificate import Multipliers, best_bound, interpolate_dual
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.subdivision import EVEN, is_stiffness_problem
-from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.equations import refine_multipliers
+from laufruhe.solvers.cones.conic import refine_multipliers, solve_cones
 
 COARSE_ROWS, MIN_SAMPLES = (1000, 3000), 24
 """Most rows of coarse programs in the order of trials, and fewest samples."""

@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_loop
-from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
-from laufruhe.extensions.joint_mounts.open_throws import OpenThrows, along_arcs
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, OpenThrows, along_arcs
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms import NORMS
@@ -33,10 +32,10 @@ from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult, bisect_in_stages
-from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import (
     PARTS,
     LinearBound,
+    LinearRelaxation,
     counted_rows,
     is_ratio,
     line_weights,

@@ -10,7 +10,7 @@ import numpy as np
 
 from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, mixes_corners
 from laufruhe.extensions.joint_mounts.load_boxes import is_boxed, load_bounds
-from laufruhe.extensions.joint_mounts.open_throws import throws_at
+from laufruhe.extensions.joint_mounts.mounted_loads import throws_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult

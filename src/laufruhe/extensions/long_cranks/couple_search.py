@@ -24,7 +24,7 @@ from laufruhe.numerics.budget import is_time_over, limit_time, timed_rounds, unt
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.workers import SERIAL, executor_for, unordered_map, worker_count
 from laufruhe.physics.crank_stars import Stars, StarSpace
-from laufruhe.solvers.stars.enumeration import SLACK, BestStars, StarSearchResult
+from laufruhe.solvers.stars.even_search import SLACK, BestStars, StarSearchResult
 
 WORTH_SHARING = 20_000_000
 """Number of arrangements of halves from which workers share the search (fifteen throws, two seconds)."""

@@ -22,12 +22,12 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
 from laufruhe.prove.throws.firing_windows_bound import firing_bound
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.even_search import (
     EvenDesign,
     EvenStarResult,
     amplitudes,
     can_list,
+    enumerate_stars,
     enumeration_result,
     merge_results,
     search_even,

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Solution
-from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint, moment_constraints
-from laufruhe.extensions.mount_relaxation.modes import mode_constraints
+from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint, mode_constraints, moment_constraints
 from laufruhe.extensions.mount_relaxation.odd_multiples import (
     HighOrder,
     LinearUpperBound,

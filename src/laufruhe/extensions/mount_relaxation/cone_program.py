@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array, eye_array, vstack
 
-from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
-from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
+from laufruhe.extensions.mount_relaxation.constraints import ModeConstraints, MomentConstraint
 from laufruhe.extensions.mount_relaxation.program import (
     QuadraticBound,
     RootTerm,

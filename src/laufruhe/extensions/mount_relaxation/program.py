@@ -19,8 +19,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
-from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
+from laufruhe.extensions.mount_relaxation.constraints import ModeConstraints, MomentConstraint
 from laufruhe.numerics.arrays import Array
 
 # diagonal shifts that may make a matrix convex, and eigenvalue that counts as zero, over the largest eigenvalue

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.extensions.mount_relaxation.box import BoxRelaxation
-from laufruhe.extensions.mount_relaxation.modes import mode_bases
+from laufruhe.extensions.mount_relaxation.constraints import mode_bases
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
 from laufruhe.extensions.mount_relaxation.orders import (
     EpigraphVariable,

@@ -39,8 +39,7 @@ from laufruhe.solvers.conclusion import (
     infeasible_result,
     witness_of,
 )
-from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.equations import refine_multipliers
+from laufruhe.solvers.cones.conic import refine_multipliers, solve_cones
 from laufruhe.solvers.result import Result
 
 MAX_BOXES, MAX_PROGRAMS = 20_000, 2_000

@@ -17,8 +17,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, build_result, infeasible_result
-from laufruhe.solvers.mounts.bounds import bound_search, minimal_conflict
-from laufruhe.solvers.mounts.nonlinear import failed_search, search_proof
+from laufruhe.solvers.mounts.nonlinear import bound_search, failed_search, minimal_conflict, search_proof
 from laufruhe.solvers.mounts.search import NEAR, MountSearch
 from laufruhe.solvers.mounts.starts import start_of_result
 from laufruhe.solvers.result import Result

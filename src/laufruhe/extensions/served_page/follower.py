@@ -19,8 +19,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import best_bound, relative_gap
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
-from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.equations import refine_multipliers
+from laufruhe.solvers.cones.conic import refine_multipliers, solve_cones
 from laufruhe.solvers.cones.tie_break import break_ties
 from laufruhe.solvers.cones.unbalances import smallest_conflict
 

@@ -25,8 +25,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult, bisect_in_stages
-from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import is_ratio, lower_bound_of_norm, ratio_under
+from laufruhe.prove.mounts.box_norms import LinearRelaxation, is_ratio, lower_bound_of_norm, ratio_under
 from laufruhe.prove.mounts.box_numbers import BOUNDED_LINEARLY, LINEAR_BOUNDS, RANGES, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.named import named_part

@@ -31,8 +31,7 @@ from laufruhe.solvers.conclusion import (
     smallest_conflicting,
     violated_limits,
 )
-from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.equations import refine_multipliers
+from laufruhe.solvers.cones.conic import refine_multipliers, solve_cones
 from laufruhe.solvers.cones.tie_break import break_ties
 from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result

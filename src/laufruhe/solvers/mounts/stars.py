@@ -31,15 +31,14 @@ from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.mounts.provers import Question, run_provers
 from laufruhe.solvers.conclusion import conflict_message, evaluate_design, refine_result, values_of, witness_of
-from laufruhe.solvers.mounts.bounds import mount_numbers, with_mount_bounds
-from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
+from laufruhe.solvers.mounts.nonlinear import mount_numbers, solve_mounts, solve_moved, with_mount_bounds
 from laufruhe.solvers.mounts.starts import start_of_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
-from laufruhe.solvers.stars.cut_search import search_designs
 from laufruhe.solvers.stars.even_search import MAX_LISTED
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import RankedStar, distinct_orders, ranked_star, ranking_result
+from laufruhe.solvers.stars.star_program import search_designs
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, with_star
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.firing_model import FiringModel
-from laufruhe.load_models.star_model import StarModel
+from laufruhe.load_models.star_model import FiringModel, StarModel
 from laufruhe.machine.firing import even_patterns, firing_lattice, order_slots, star_steps
 from laufruhe.machine.layouts import Layout, even_throws
 from laufruhe.physics.crank_stars import Stars, StarSpace
