@@ -94,7 +94,8 @@ def along_arcs(halves: Array) -> tuple[Array, Array, Array]:
     Order h of a throw at the angle theta has the load c e^{i h theta}. Over theta = m + t d and a = h d at most pi it
     is c e^{i h m} ((1 + cos a) / 2 + i t sin a), up to |c| ((1 - cos a)^2 / 4 + (a^3 / (9 root 3))^2)^(1/2): cos(a t)
     lies between cos a and 1, and sin(a t) differs from its chord by at most a^3 (t - t^3) / 6. A remainder over |c|
-    replaces the order. The arrays have the shape of `halves`: the real middle value, the slope along i, and a bound of the error.
+    replaces the order. The arrays have the shape of `halves`: the real middle value, the slope along i, and a bound of
+    the error.
     """
     remainder = np.hypot(0.5 * (1.0 - np.cos(halves)), halves**3 / (9.0 * math.sqrt(3.0)))
     is_expanded = (halves <= math.pi) & (remainder < 1.0)
