@@ -340,7 +340,7 @@ def _refuse(problem: Problem, ranks: Sequence[PriorityLevel]) -> None:
 def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
     """Return the result of the first reduction that applies to a problem, else of the first method that suits it.
 
-    An exact method for part of the measures may raise the lower bound of the method.
+    A stronger method for part of the measures may raise the lower bound of the method.
     """
     remaining = reductions() if remaining is None else remaining
     for k, reduction in enumerate(remaining):
@@ -350,11 +350,10 @@ def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = Non
     report_progress(method.name)
     if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS} and (conflict := conflict_on_any_mounts(problem)):
         return infeasible_result(problem, evaluate_start(problem), conflict, {})
-    closing = _exact_part(problem, kinds, method)
-    if closing is None:
+    relaxed = _relaxation(problem, kinds, method)
+    if relaxed is None:
         return method.solve(problem)
-    other, relaxed = closing
-    return solve_by_relaxation(problem, relaxed, other.solve, method.solve)
+    return solve_by_relaxation(problem, relaxed, partial(_solve_reduced, remaining=()), method.solve)
 
 
 def by_solver(problem: Problem, name: str) -> Problem:
@@ -462,15 +461,16 @@ def reductions() -> tuple[Reduction, ...]:
     return table
 
 
-def _exact_part(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
-    """Return an exact method that bounds a problem from below, and its problem with fewer terms and limits.
+def _relaxation(problem: Problem, kinds: frozenset[Kind], method: Method) -> Problem | None:
+    """Return the problem with the measures that a method before `method` in the table accepts.
 
-    The result is None if no exact method suits a part of the measures.
+    The method that accepts most terms, then most limits, decides which. The result is None if none accepts a term.
     """
     if method.strength is ProofStrength.EXACT or not problem.search.proves:
         return None
-    for other in METHODS:
-        if other.strength is not ProofStrength.EXACT or not kinds <= other.kinds:
+    parts = []
+    for other in METHODS[: METHODS.index(method)]:
+        if not kinds <= other.kinds:
             continue
         unlimited = problem.changed(limits=())
         terms = tuple(term for term in problem.objective if other.suits(unlimited.changed(objective=(term,))))
@@ -479,5 +479,14 @@ def _exact_part(problem: Problem, kinds: frozenset[Kind], method: Method) -> tup
         if terms and all(measure.is_load or measure.is_mounting for measure in missing):
             relaxed = unlimited.changed(objective=terms)
             limits = tuple(limit for limit in problem.limits if other.suits(relaxed.changed(limits=(limit,))))
-            return other, relaxed.changed(limits=limits)
-    return None
+            parts.append(relaxed.changed(limits=limits))
+    parts = [part for part in parts if _is_solvable(part)]
+    return max(parts, key=lambda part: (len(part.objective), len(part.limits)), default=None)
+
+
+def _is_solvable(problem: Problem) -> bool:
+    try:
+        _refuse(problem, ())
+    except ModelError:
+        return False
+    return True

@@ -1,7 +1,7 @@
 """Bound a problem by a relaxation without some limits and objective terms (P18).
 
-The relaxation leaves out measures for which an exact method has no formulas. Its lower bound holds for the problem. If
-its optimum also meets the missing limits and the objective is complete, it is the optimum of the problem.
+The relaxation leaves out measures for which a method with a bound has no formulas. Its lower bound holds for the
+problem. If its optimum also meets the missing limits and the objective is complete, it is the optimum of the problem.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from laufruhe.errors import counted
+from laufruhe.errors import SolverError, counted
+from laufruhe.numerics.budget import limit_time, seconds_left
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
@@ -22,25 +23,25 @@ Solve = Callable[[Problem], Result]
 
 
 def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve: Solve) -> Result:
-    """Return the optimum of an easier problem if it is feasible, else the design of `solve` with its lower bound.
+    """Return the optimum of an easier problem if it is feasible, else the best known design with its lower bound.
 
     Parameters
     ----------
     relaxed
         Problem without some limits and some non-negative objective terms; `prove` solves it.
+    solve
+        Method for the whole problem, which has at least half of the time.
     """
-    proven = prove(relaxed)
+    try:
+        with limit_time(0.5 * seconds_left()):
+            proven = prove(relaxed)
+    except SolverError:
+        return solve(problem)
     if proven.status is Status.INFEASIBLE:
         return with_constant_limits(proven, problem.limits)
-    certificate = proven.certificate
-    is_optimal = certificate is not None and certificate.kind is Proof.GLOBAL and relaxed.objective == problem.objective
-    if is_optimal and proven.final.violation(problem.limits) <= FEASIBILITY_TOL:
-        # limits left out of the relaxed problem have no price
-        values = dict(zip(proven.problem.limits, proven.limits, strict=True))
-        free = {(limit, side): Price(0.0, math.nan) for limit in problem.limits for side in ("at most", "at least")}
-        missing_values = limit_values(problem, proven.final, free)
-        limits = (values.get(limit, value) for limit, value in zip(problem.limits, missing_values, strict=True))
-        return replace(proven, problem=proven.problem.changed(limits=problem.limits), limits=tuple(limits))
+    candidate, certificate = _with_all_limits(problem, proven), proven.certificate
+    if candidate is not None and candidate.status is Status.OPTIMAL:
+        return candidate
     result = solve(problem)
     if certificate is None:
         return result
@@ -49,7 +50,26 @@ def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve:
         "term": len(problem.objective) - len(relaxed.objective),
     }
     left_out = " and ".join(counted(count, name) for name, count in counts.items() if count)
-    return with_better_bound(result, certificate.lower_bound, f"bound without {left_out}")
+    result = with_better_bound(result, certificate.lower_bound, f"bound without {left_out}")
+    return result if candidate is None or _value(result) <= _value(candidate) else candidate
+
+
+def _with_all_limits(problem: Problem, proven: Result) -> Result | None:
+    """Return a result without some limits as one of the whole problem; None if its design violates one of them."""
+    is_complete = proven.status.has_design and proven.problem.objective == problem.objective
+    if not is_complete or proven.final.violation(problem.limits) > FEASIBILITY_TOL:
+        return None
+    # limits left out of the relaxed problem have no price
+    values = dict(zip(proven.problem.limits, proven.limits, strict=True))
+    free = {(limit, side): Price(0.0, math.nan) for limit in problem.limits for side in ("at most", "at least")}
+    missing_values = limit_values(problem, proven.final, free)
+    limits = (values.get(limit, value) for limit, value in zip(problem.limits, missing_values, strict=True))
+    return replace(proven, problem=proven.problem.changed(limits=problem.limits), limits=tuple(limits))
+
+
+def _value(result: Result) -> float:
+    is_feasible = result.status.has_design and result.objective is not None
+    return result.objective.value if is_feasible and result.objective is not None else math.inf
 
 
 def with_better_bound(result: Result, bound: float, source: str) -> Result:
