@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Shaft, SliderCrank
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Shaft, SliderCrank
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics import mechanism
+from laufruhe.physics.bearing_loads import piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.torque import crank_torque
 from one_cylinder import inertia_coefficients
 
 ROUNDING = 2e-13
@@ -50,10 +54,21 @@ def test_the_transform_stops_where_the_tail_is_gone() -> None:
     assert table[-1] < 1e-15 * table.max()
 
 
-def test_masses_do_not_decide_how_many_orders_there_are() -> None:
+def torque(part: SliderCrank) -> ComplexArray:
+    engine = Engine("one", Cycle.FOUR_STROKE, (part,))
+    return crank_torque(engine, OperatingPoint("rated", 300.0)).coefficients[:, None].T
+
+
+def pin_force(part: SliderCrank) -> ComplexArray:
+    engine = Engine("one", Cycle.FOUR_STROKE, (part,))
+    return piston_pin_forces(engine, OperatingPoint("rated", 300.0)).coefficients.reshape(-1, 2).T
+
+
+@pytest.mark.parametrize("orders", [mechanism.momentum_orders, torque, pin_force])
+def test_masses_do_not_decide_how_many_orders_there_are(orders: Callable[[SliderCrank], ComplexArray]) -> None:
     """Loads are affine in the masses: a signal with kinks beside them is then the same for every mass."""
     part = SliderCrank("part", 0.0, 0.05, 0.14, 1.0, offset=0.01, rod_inertia_deficit=-0.002)
-    tables = [mechanism.momentum_orders(replace(part, reciprocating_mass=mass)) for mass in (0.0, 1e-9, 0.3, 1.5)]
+    tables = [orders(replace(part, reciprocating_mass=mass)) for mass in (0.0, 1e-9, 0.3, 1.5)]
     assert len({table.shape for table in tables}) == 1
     mixed = 0.8 * tables[0] + 0.2 * tables[3]
     assert np.abs(tables[2] - mixed).max() <= 1e-15 * np.abs(tables[2]).max()

@@ -33,7 +33,7 @@ from laufruhe.numerics.exact_angles import as_turn, cis, star_sum
 from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import pressure_breaks, thrust_at
-from laufruhe.physics.mechanism import resolved_orders
+from laufruhe.physics.mechanism import orders_of_masses
 from laufruhe.physics.shaking_loads import rotor_loads, rotor_wrench
 from laufruhe.physics.star_loads import order_index, spread
 
@@ -216,22 +216,24 @@ def _reactions(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses
 def _inertia_orders(part: SliderCrank, fidelity: Fidelity) -> ComplexArray:
     """Return the inertia part at unit speed of the crank, by order of its own angle, shape (n, 5) (B1, B2)."""
     is_short = fidelity.kinematics == "two-order" and type(part) is SliderCrank
-
-    def loads(alpha: Array) -> tuple[Array, ...]:
-        motion = part.motion(np, alpha)
-        mass, (_, _, acceleration) = motion.points[0]
-        if is_short:
-            acceleration = -part.crank_radius * (np.cos(alpha) + part.rod_ratio * np.cos(2.0 * alpha))
-        sine, cosine = part.rod_lean(np, alpha)
-        along = -mass * acceleration.real
-        across = -along * sine / cosine
-        for inertia, (_, turning) in motion.swings if fidelity.rod == "rigid" and part.rod_ratio > 0.0 else ():
-            across += inertia * turning / (part.rod_length * cosine)
-        return _reactions(part, alpha, along + 1j * across, True)
-
-    table = resolved_orders(loads, np.ones((5, 1)), part.name).T
+    points, rods = np.split(orders_of_masses(part, _inertia_rows, (1,) * 10, is_short), 2)
+    table = (points + rods if fidelity.rod == "rigid" else points).T
     last = fidelity.local_orders(part.shaft.ratio)
     return table if last is None else table[: last + 1]
+
+
+def _inertia_rows(part: SliderCrank, alpha: Array, is_short: bool) -> tuple[Array, ...]:
+    # columns of `_pin_loads` by point masses, then by swings of the rod
+    motion = part.motion(np, alpha)
+    mass, (_, _, acceleration) = motion.points[0]
+    if is_short:
+        acceleration = -part.crank_radius * (np.cos(alpha) + part.rod_ratio * np.cos(2.0 * alpha))
+    sine, cosine = part.rod_lean(np, alpha)
+    along, across = -mass * acceleration.real, 0.0 * alpha
+    for inertia, (_, turning) in motion.swings if part.rod_ratio > 0.0 else ():
+        across = across + inertia * turning / (part.rod_length * cosine)
+    thrust = along - 1j * along * sine / cosine
+    return (*_reactions(part, alpha, thrust, True), *_reactions(part, alpha, 1j * across, False))
 
 
 @lru_cache(maxsize=256)

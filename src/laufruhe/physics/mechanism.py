@@ -8,7 +8,7 @@ slider-crank, they are taken in place of a transform.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import lru_cache
 from typing import Any
@@ -162,35 +162,57 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
 
     They are axial and transverse force, and the roll moments of point masses and of swings.
     """
-    motion = part.motion(np, np.zeros(1))
-    masses = np.array([mass for mass, _ in (*motion.points, *motion.swings)])
-    table = np.tensordot(masses, _unit_orders(part.only({})), 1)
+    table = orders_of_masses(part, _momentum_rows, (1, 1, 2, 2))
+    # a periodic momentum has no mean derivative
+    table[:, 0] = 0.0
     table.setflags(write=False)
     return table
 
 
-@lru_cache(maxsize=256)
-def _unit_orders(part: SliderCrank) -> ComplexArray:
-    """Return the loads of a unit of each mass and inertia of the motion, shape (masses, 4, orders).
+def _momentum_rows(part: SliderCrank, alpha: Array) -> tuple[Any, ...]:
+    force, roll, rods = momentum_loads(part, part.motion(np, alpha), 1.0)
+    return np.real(force), np.imag(force), roll, rods
+
+
+def orders_of_masses(
+    part: SliderCrank, rows: Callable[..., Sequence[Any]], lengths: tuple[int, ...], *options: bool
+) -> ComplexArray:
+    """Return the coefficients of loads that are linear in the masses of a mechanism, shape (loads, orders).
 
     No mass decides how many orders there are, so loads are affine in the masses, also beside a signal with kinks.
+
+    Parameters
+    ----------
+    rows
+        Function that returns the loads of a mechanism at angles of its crank, and takes these `options`.
+    lengths
+        Power of length in the unit of each load.
     """
+    masses = np.array([getattr(part, name) for name in _units(part)])
+    # neither its place nor its phase changes the loads in the plane of its axis
+    bare = replace(part.only({}), x=0.0, throw=0.0, firing_angle=0.0)
+    return np.asarray(np.tensordot(masses, _unit_orders(bare, rows, lengths, options), 1))
 
-    def rows(alpha: Array) -> list[Any]:
-        motion = part.motion(np, alpha)
-        units = [Motion(((1.0, moved),)) for _, moved in motion.points]
-        units += [Motion((), ((1.0, moved),)) for _, moved in motion.swings]
-        loads = [momentum_loads(part, unit, 1.0) for unit in units]
-        return [row for force, roll, rods in loads for row in (np.real(force), np.imag(force), roll, rods)]
 
-    radius = part.crank_radius
-    # forces and roll moment of a unit mass, roll moment of a unit inertia
-    scale = np.array([radius, radius, radius**2, 1.0])
-    count = len(rows(np.zeros(1))) // len(scale)
-    table = resolved_orders(rows, np.tile(scale, count)[:, None], part.name).reshape(count, len(scale), -1)
-    # a periodic momentum has no mean derivative
-    table[:, :, 0] = 0.0
-    return table
+def _units(part: SliderCrank) -> dict[str, int]:
+    # masses and inertias by field name, with their powers of length
+    return {name: length for name, (mass, length) in part.powers.items() if mass}
+
+
+@lru_cache(maxsize=512)
+def _unit_orders(
+    part: SliderCrank, rows: Callable[..., Sequence[Any]], lengths: tuple[int, ...], options: tuple[bool, ...]
+) -> ComplexArray:
+    """Return the coefficients of the loads of a unit of each mass and inertia, shape (masses, loads, orders)."""
+    units = _units(part)
+    of_units = [part.only({name: 1.0}) for name in units]
+    scale = [part.crank_radius ** (length - power) for power in units.values() for length in lengths]
+
+    def signals(alpha: Array) -> list[Any]:
+        return [row for unit in of_units for row in rows(unit, alpha, *options)]
+
+    table = resolved_orders(signals, np.array(scale)[:, None], part.name)
+    return table.reshape(len(units), len(lengths), -1)
 
 
 def resolved_orders(rows: Callable[[Array], Sequence[Any]], scale: Any, name: str) -> ComplexArray:

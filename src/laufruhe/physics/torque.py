@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.gravity import with_gravity
 from laufruhe.physics.load_torque import less_load
-from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, reduced, resolved_orders, two_order_roll
+from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, orders_of_masses, reduced, two_order_roll
 from laufruhe.physics.rigid_body import ROLL
 from laufruhe.physics.seiliger_cycle import motored_gas
 from laufruhe.physics.star_loads import star_loads
@@ -171,17 +172,22 @@ def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
     is_rigid, is_short = fidelity.rod == "rigid", fidelity.kinematics == "two-order"
     key = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid, is_short
 
-    def torque(alpha: np.ndarray) -> tuple[np.ndarray]:
-        _, slope = reduced(part.motion(np, alpha), is_rigid)
-        return (-0.5 * part.shaft.ratio * slope,)
-
     def series() -> ComplexArray:
         if is_short and type(part) is SliderCrank:
             return part.reciprocating_mass * part.crank_radius**2 * part.shaft.ratio * two_order_roll(part.rod_ratio)
-        table = np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])
+        points, rods = orders_of_masses(part, _torque_rows, (2, 2))
+        table = points + rods if is_rigid else points
         return table[: TWO_ORDER_ROLL + 1] if is_short else table
 
     return Effect(Direction.ROLL, 1.0, key, series)
+
+
+def _torque_rows(part: SliderCrank, alpha: Array) -> tuple[Any, Any]:
+    # torque of point masses and of swings
+    motion = part.motion(np, alpha)
+    (_, total), (_, points) = reduced(motion), reduced(motion, with_rods=False)
+    factor = -0.5 * part.shaft.ratio
+    return factor * points, factor * (total - points)
 
 
 _NARROW = 1e-6
