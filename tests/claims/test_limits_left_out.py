@@ -8,11 +8,14 @@ import pytest
 
 import laufruhe
 from attack.crossings import transmissibility_and_weights
+from attack.families import few_stiffnesses
+from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.wording import explained, headline
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 
 INPUTS = Path(__file__).parent / "inputs"
 
@@ -60,6 +63,22 @@ def test_the_optimum_without_a_limit_that_it_keeps_is_the_optimum() -> None:
         )
         if design.violation(own.limits) <= 0.0:
             assert found.certificate.lower_bound <= objective_value(own, design)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "kind"), [(1.01, Proof.GLOBAL), (0.99, Proof.WITHIN_GAP)])
+def test_stiffness_has_a_bound_under_a_limit_without_formulas(share: float, kind: Proof) -> None:
+    """Boxes of stiffness know no motion frequencies, which a limit holds just above or below those of the optimum."""
+    own = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
+    free, measure = laufruhe.solve(own), Measure(CHANNELS["motion frequencies"])
+    limit = Limit("roll", measure, maximum=share * max(free.final.values(measure)))
+    found = laufruhe.solve(own.changed(limits=(*own.limits, limit)))
+    assert free.certificate is not None
+    assert found.certificate is not None
+    assert found.objective is not None
+    assert found.certificate.kind is kind
+    assert found.certificate.lower_bound == free.certificate.lower_bound
+    assert found.final.violation(found.problem.limits) <= FEASIBILITY_TOL
 
 
 @pytest.mark.slow

@@ -128,6 +128,7 @@ def test_own_constraints_hold_and_cost() -> None:
     assert alone < 0.999 * proven.objective.value
     assert proven.certificate.kind is Proof.WITHIN_GAP
     assert proven.certificate.lower_bound == pytest.approx(alone, rel=1e-4)
+    assert proven.certificate.kkt_residual == pytest.approx(proven.certificate.gap)
     evaluated = laufruhe.evaluate(problem, values=program.values).forces(720).mount_force
     peak = float(abs(evaluated.sel(design="initial", mount="front left", direction="z")).max())
     assert float(np.abs(force.value).max()) == pytest.approx(peak, rel=1e-4)

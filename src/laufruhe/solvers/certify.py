@@ -24,7 +24,7 @@ from laufruhe.problem.evaluation import FINE_SAMPLES, evaluate, fine_samples
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Multipliers, Proof, ProofStrength, best_bound, gap_of, kkt_residual
+from laufruhe.prove.certificate import Multipliers, Proof, ProofStrength, best_bound, gap_of, kkt_residual, relative_gap
 from laufruhe.solvers.accuracy import solve_accurately
 from laufruhe.solvers.conclusion import (
     Design,
@@ -66,7 +66,7 @@ def certify(problem: Problem, values: Mapping[str, Any], multipliers: Mapping[st
             reference = solve(problem)
             # the solve may take more samples of the gas
             design = _exact_design(problem.at(reference.problem.fidelity), decided, reference.final.samples)
-            result = result_of(design, _initial_design(design.problem), _proof_of(reference), {})
+            result = result_of(design, _initial_design(design.problem), _proof_of(reference, design), {})
             if reference.status is Status.INFEASIBLE:
                 message = "the solve excludes every design, which this design contradicts; please report it"
         else:
@@ -130,16 +130,17 @@ def _exact_design(problem: Problem, values: list[Value], samples: int = FINE_SAM
     return design
 
 
-def _proof_of(reference: Result) -> ProofData:
+def _proof_of(reference: Result, design: Design) -> ProofData:
     # the lower bound of a solve holds for every design
-    certificate, objective = reference.certificate, reference.objective
-    if certificate is None:
-        value = objective.value if objective is not None and not reference.problem.decisions else 0.0
-        return ProofData(value, ProofStrength.EXACT, math.inf, "evaluation")
-    is_exact = certificate.kind in (Proof.GLOBAL, Proof.WITHIN_GAP)
+    certificate = reference.certificate
+    bound, method, is_exact = 0.0 if reference.problem.decisions else design.value, "evaluation", True
+    if certificate is not None:
+        bound, method = certificate.lower_bound, f"bound of a solve: {certificate.method}"
+        is_exact = certificate.kind in (Proof.GLOBAL, Proof.WITHIN_GAP)
     strength = ProofStrength.EXACT if is_exact else ProofStrength.RELAXED
-    method = f"bound of a solve: {certificate.method}"
-    return ProofData(certificate.lower_bound, strength, math.inf, method, reference.prices)
+    # the gap of a feasible design bounds stationarity and complementarity
+    gap = relative_gap(design.value, bound, numerical_zero(design.problem, design.evaluation.engine))
+    return ProofData(bound, strength, max(design.violation, gap, 0.0), method, reference.prices)
 
 
 def _bounded(design: Design, multipliers: Mapping[str, Any]) -> ProofData:
