@@ -217,8 +217,8 @@ _CORE: tuple[Method, ...] = (
     Method(
         "local programs of all numbers", dict.fromkeys(KINDS.values(), _ANY), ProofStrength.RELAXED, solve_all_numbers,
         accepts_norm=lambda _: True,
-        proves="a local optimum by exact evaluations, with the bound of a row above that accepts all open numbers and a "
-        "term; of 60 stars at most, each by its own method",
+        proves="a local optimum by exact evaluations, with the bound of a row above that accepts all open numbers and "
+        "a term; of 60 stars at most, each by its own method",
     ),
 )  # fmt: skip
 
