@@ -232,8 +232,9 @@ def _inertia_rows(part: SliderCrank, alpha: Array, is_short: bool) -> tuple[Arra
     along, across = -mass * acceleration.real, 0.0 * alpha
     for inertia, (_, turning) in motion.swings if part.rod_ratio > 0.0 else ():
         across = across + inertia * turning / (part.rod_length * cosine)
-    thrust = along - 1j * along * sine / cosine
-    return (*_reactions(part, alpha, thrust, True), *_reactions(part, alpha, 1j * across, False))
+    thrust = np.asarray(along * (1.0 - 1j * sine / cosine), dtype=complex)
+    swing = np.asarray(1j * across, dtype=complex)
+    return (*_reactions(part, alpha, thrust, True), *_reactions(part, alpha, swing, False))
 
 
 @lru_cache(maxsize=256)

@@ -175,8 +175,8 @@ def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
     def series() -> ComplexArray:
         if is_short and type(part) is SliderCrank:
             return part.reciprocating_mass * part.crank_radius**2 * part.shaft.ratio * two_order_roll(part.rod_ratio)
-        points, rods = orders_of_masses(part, _torque_rows, (2, 2))
-        table = points + rods if is_rigid else points
+        tables = orders_of_masses(part, _torque_rows, (2, 2))
+        table: ComplexArray = tables.sum(axis=0) if is_rigid else tables[0]
         return table[: TWO_ORDER_ROLL + 1] if is_short else table
 
     return Effect(Direction.ROLL, 1.0, key, series)
