@@ -214,7 +214,7 @@ def _reactions(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses
 
 @lru_cache(maxsize=256)
 def _inertia_orders(part: SliderCrank, fidelity: Fidelity) -> ComplexArray:
-    """Return the inertia part at unit speed of the crank, by order of its own angle, shape (n, 5) (B1, B2)."""
+    # inertia part at unit speed of the crank, by order of its own angle, shape (n, 5) (B1, B2)
     is_short = fidelity.kinematics == "two-order" and type(part) is SliderCrank
     points, rods = np.split(orders_of_masses(part, _inertia_rows, (1,) * 10, is_short), 2)
     table = (points + rods if fidelity.rod == "rigid" else points).T
