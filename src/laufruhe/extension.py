@@ -150,8 +150,8 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     },
     "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
-    "norms": {"rmq": "root_mean_quad"},
-    "layouts": {"rotary": "rotary"},
+    "norms": {"rmq": "root_mean_quad", "worst mean": "worst_mean"},
+    "layouts": {"delta": "delta", "rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")

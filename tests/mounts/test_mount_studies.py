@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError
+from laufruhe.extensions.sweeps.sweep import SweepTable, axis_of
 from laufruhe.files.reader import load
-from laufruhe.files.study_tables import SweepTable, axis_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import evaluate_only, solve
 from laufruhe.studies.reader import load_study

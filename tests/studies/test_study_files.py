@@ -12,10 +12,11 @@ from typer.testing import CliRunner
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.errors import InputError
+from laufruhe.extensions.sweeps.sweep import SweepTable, axis_of
 from laufruhe.extensions.sweeps.swept import dataset
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load
-from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at, keys_of
+from laufruhe.files.study_tables import CaseTable, field_at, keys_of
 from laufruhe.studies.equal_power import at_equal_power
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run

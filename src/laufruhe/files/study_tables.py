@@ -6,9 +6,8 @@ import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-import numpy as np
 from pydantic import BeforeValidator, Field
 
 from laufruhe import units
@@ -21,7 +20,7 @@ from laufruhe.files.nested import number_at
 from laufruhe.files.problem_file import file_model
 
 MAX_POINTS = 100_000
-_DIGITS = 12
+DIGITS = 12
 
 
 def _single(raw: object) -> object:
@@ -36,22 +35,6 @@ Setting: TypeAlias = Annotated[
     BeforeValidator(lambda raw: [_single(entry) for entry in raw] if isinstance(raw, list) else _single(raw)),
 ]
 End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
-
-
-class SweepTable(Table):
-    """Swept quantity of the problem and its values: listed, or spaced between two ends."""
-
-    quantity: str = f.required("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
-    values: list[Value] | None = None
-    first: End = Field(default=None, alias="from")
-    last: End = Field(default=None, alias="to")
-    points: int | None = f.optional("Number of values from the first to the last.")
-    spacing: Literal["linear", "log"] | None = None
-
-    @property
-    def count(self) -> int:
-        """Number of swept values."""
-        return (self.points or 0) if self.values is None else len(self.values)
 
 
 class CaseTable(Table):
@@ -170,54 +153,6 @@ def field_at(where: str) -> f.Number | None:
 
 
 @dataclass(frozen=True)
-class SweepAxis:
-    """Swept quantity, a path in the problem file, with its values as in a problem file.
-
-    The numbers are the values in the unit of the study file, which is "1" for plain numbers. Labels have the unit ""
-    and no numbers.
-    """
-
-    quantity: str
-    values: tuple[Value, ...]
-    unit: str
-    numbers: tuple[float, ...] | None
-
-    @property
-    def name(self) -> str:
-        """Name in reports: the last part of the path, with the list of an index or the limit of a side."""
-        *before, last = parts_of(self.quantity.replace("_", " "))
-        if before and last.isdigit():
-            return f"{before[-1]} {last}"
-        if before[:1] == ["constraints"]:
-            limit = f"limit {before[1]}" if before[1].isdigit() else before[1]
-            return f"{limit}, {SIDES.get(last, last)}"
-        return last
-
-    def by_value(self) -> dict[Value, float]:
-        """Return the numbers of the values; empty for labels."""
-        return dict(zip(self.values, self.numbers, strict=True)) if self.numbers is not None else {}
-
-
-def axis_of(sweep: SweepTable) -> SweepAxis:
-    """Return the values of a sweep with their unit; raise `Refused` if there are fewer than two, or equal ones."""
-    spaced = (sweep.first, sweep.last, sweep.points)
-    if sweep.values is None:
-        values, key = _spaced(sweep), "points"
-    elif any(value is not None for value in (*spaced, sweep.spacing)):
-        raise Refused("values", None, "are given, but also from, to, points or spacing", "give one or the other")
-    else:
-        values, key = tuple(sweep.values), "values"
-    if len(values) < 2:
-        rule = "holds one value, which is no sweep" if values else "is empty"
-        raise Refused(key, list(values), rule, "give at least two values, or remove the sweep")
-    unit, numbers = _measured(sweep.quantity, values, key)
-    # 1 and true are equal in Python, and 6 m/s is 6000 mm/s
-    if len(set(numbers if numbers is not None else map(str, values))) < len(values):
-        raise Refused(key, list(values), "names a value twice", "name each once")
-    return SweepAxis(sweep.quantity, values, unit, numbers)
-
-
-@dataclass(frozen=True)
 class Span:
     """Range of a quantity, a path in the problem file, that is swept or drawn, linearly or by its logarithm.
 
@@ -237,8 +172,8 @@ def span_of(quantity: str, first: Value, last: Value, spacing: str | None) -> Sp
     """Return the range of a quantity between two ends; raise `Refused` if these do not fit."""
     for key, end in (("from", first), ("to", last)):
         # each end separately, so that complaints name the wrong one
-        _measured(quantity, (end,), key)
-    unit, numbers = _measured(quantity, (first, last), "from")
+        measured(quantity, (end,), key)
+    unit, numbers = measured(quantity, (first, last), "from")
     if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
         remedy = "write its whole path, such as operating_points.1.speed"
         raise Refused("quantity", quantity, "is not the path of a number in the problem file", remedy)
@@ -255,31 +190,7 @@ def span_of(quantity: str, first: Value, last: Value, spacing: str | None) -> Sp
     return Span(quantity, unit, low, high, spacing == "log", is_text)
 
 
-def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
-    ends = {"from": sweep.first, "to": sweep.last, "points": sweep.points}
-    missing = [key for key, value in ends.items() if value is None]
-    if len(missing) == len(ends):
-        raise Refused("values", None, "is missing", "add values, or from, to and points")
-    if sweep.first is None or sweep.last is None or sweep.points is None:
-        raise Refused(missing[0], None, "is missing", "an equally spaced sweep needs the keys from, to and points")
-    if sweep.points < 2:
-        raise Refused("points", sweep.points, "makes no sweep", "give two points or more")
-    if sweep.points > MAX_POINTS:
-        raise Refused("points", sweep.points, f"is more than {MAX_POINTS}", "give fewer")
-    span = span_of(sweep.quantity, sweep.first, sweep.last, sweep.spacing)
-    with np.errstate(all="ignore"):
-        numbers = (np.geomspace if span.is_log else np.linspace)(span.low, span.high, sweep.points)
-    if not np.isfinite(numbers).all():
-        raise Refused(
-            "to", sweep.last, "is too far from the other end of the range for equal steps", "narrow the sweep"
-        )
-    texts = [f"{number:.{_DIGITS}g}" for number in numbers]
-    if not span.is_text:
-        return tuple(map(float, texts))
-    return tuple(texts) if span.unit == "1" else tuple(f"{text} {span.unit}" for text in texts)
-
-
-def _measured(quantity: str, values: tuple[Value, ...], key: str) -> tuple[str, tuple[float, ...] | None]:
+def measured(quantity: str, values: tuple[Value, ...], key: str) -> tuple[str, tuple[float, ...] | None]:
     """Return the unit of the first swept value, and all values in this unit; None in place of values for labels."""
     field = field_at(quantity)
     numbers = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
@@ -299,7 +210,7 @@ def _measured(quantity: str, values: tuple[Value, ...], key: str) -> tuple[str, 
         raise Refused(key, list(values), "mixes numbers with and without a unit", "write all alike")
     unit = units.unit_of(texts[0])
     unit_value = units.parse(f"1 {unit}", unit_needed)
-    return unit or "1", tuple(float(f"{number / unit_value:.{_DIGITS}g}") for number in si)
+    return unit or "1", tuple(float(f"{number / unit_value:.{DIGITS}g}") for number in si)
 
 
 def _is_limit(quantity: str) -> bool:

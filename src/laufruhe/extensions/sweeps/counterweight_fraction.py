@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from laufruhe.extensions.sweeps.sweep import SweepAxis
 from laufruhe.extensions.sweeps.swept import SweptPart, coordinates, dataset
 from laufruhe.extensions.sweeps.swept_report import (
     bars,
@@ -21,7 +22,7 @@ from laufruhe.extensions.sweeps.swept_report import (
     swept_names,
 )
 from laufruhe.files.rotors import FACTORS
-from laufruhe.files.study_tables import SweepAxis, at
+from laufruhe.files.study_tables import at
 from laufruhe.present import picture as p
 from laufruhe.studies.scenes import Point, ProblemFiles
 

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from laufruhe.extensions.sweeps.sweep import SweepAxis, SweepTable, axis_of
 from laufruhe.extensions.sweeps.swept_report import by_point
 from laufruhe.files import fields as f
 from laufruhe.files.measures import QuantityName
-from laufruhe.files.study_tables import CaseTable, SweepAxis, SweepTable, axis_of, changed, keys_of
+from laufruhe.files.study_tables import CaseTable, changed, keys_of
 from laufruhe.problem import channels
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Part, Record, variable

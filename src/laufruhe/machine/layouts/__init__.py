@@ -16,13 +16,12 @@ from laufruhe.machine.layouts.build import (
     even_throws,
     throw_rotors,
 )
-from laufruhe.machine.layouts.delta import Delta
 from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.layouts.radial import Radial
 
 LAYOUTS: Mapping[str, LayoutKind] = extended(
-    "layouts", LayoutKind, (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), XEngine(), Parts())
+    "layouts", LayoutKind, (Inline(), Vee(), Boxer(), OpposedPiston(), Radial(), XEngine(), Parts())
 )
 
 __all__ = [

@@ -10,10 +10,9 @@ from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import Cones, Grid, Norm, lengths, norm_instance, softened_lengths
 from laufruhe.numerics.norms.peak_to_peak import PeakToPeak
 from laufruhe.numerics.norms.rms import RootMeanSquare
-from laufruhe.numerics.norms.worst_mean import WorstMean
 
 __all__ = ["MEAN", "NORMS", "RMS", "Cones", "Grid", "Norm", "lengths", "softened_lengths"]
 
-_CLASSES = extended("norms", Norm, (Mean, Maximum, RootMeanSquare, PeakToPeak, WorstMean))
+_CLASSES = extended("norms", Norm, (Mean, Maximum, RootMeanSquare, PeakToPeak))
 NORMS: Mapping[str, Norm] = {name: norm_instance(norm) for name, norm in _CLASSES.items()}
 MEAN, RMS = NORMS["mean"], NORMS["rms"]

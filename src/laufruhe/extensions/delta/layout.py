@@ -146,3 +146,6 @@ class Delta(LayoutKind):
                 fired = sorted(range(1, len(fires) + 1), key=lambda k: fires[k - 1])
                 raise ModelError(f"these throws fire in the order {fired}, not {list(order)}")
         return tuple(pistons), tuple(cranks)
+
+
+DELTA = Delta()
