@@ -22,6 +22,8 @@ from laufruhe.solvers.result import Result, Status
 PIPE_WIDTH = 110
 BETWEEN = 3
 """Number of blanks between two columns."""
+SHORT_LABEL = 10
+"""Largest number of characters of a cell that is not wrapped, such as 5000 rpm."""
 _COLOURS = {Status.OPTIMAL: "green", Status.FEASIBLE: "green", Status.INFEASIBLE: "red", Status.FAILED: "red"}
 
 
@@ -106,8 +108,10 @@ def _widths(grid: Table) -> list[tuple[int, int]]:
     widths = []
     for k, head in enumerate(grid.head):
         cells = [row[k] for row in grid.rows]
-        words = [piece for text in ([head, *cells] if k in grid.texts else [head]) for piece in text.split()]
-        minimum = max(map(cell_len, words if k in grid.texts else [*words, *cells]), default=1)
+        texts = [text for text in cells if k in grid.texts and len(text) > SHORT_LABEL]
+        words = [piece for text in (head, *texts) for piece in text.split()]
+        words += [text for text in cells if k not in grid.texts or len(text) <= SHORT_LABEL]
+        minimum = max(map(cell_len, words), default=1)
         widths.append((minimum, max(map(cell_len, [head, *cells]))))
     return widths
 

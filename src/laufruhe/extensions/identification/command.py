@@ -23,7 +23,7 @@ def identify(
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
-    """Estimate the open numbers of a built engine from measured orders.
+    """Estimate numbers of a built engine from measured orders.
 
     Least squares within the bounds, with confidence intervals and what the measurement does not determine.
     """

@@ -11,7 +11,7 @@ from laufruhe.extensions.piston_motion.channels import RODS, reversals_at
 from laufruhe.extensions.piston_motion.motion import Extreme, PistonMotion, piston_motion, pistons_of
 from laufruhe.machine import SliderCrank
 from laufruhe.physics.bearing_loads import has_bearing_loads
-from laufruhe.present.numbers import number
+from laufruhe.present.numbers import number, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.problem.loads import PointLoads
 from laufruhe.report.section import Section
@@ -71,7 +71,7 @@ def _text(value: float, unit: str) -> str:
 
 
 def _at(extreme: Extreme, unit: str) -> str:
-    return f"{_text(extreme.value, unit)} at {number(math.degrees(extreme.angle), 3, 360.0)} deg"
+    return f"{_text(extreme.value, unit)} at {trimmed(round(math.degrees(extreme.angle), 1) + 0.0)} deg"
 
 
 SECTION = Section("piston_motion", _has_pistons, _tables, _record, ("piston-motion",))

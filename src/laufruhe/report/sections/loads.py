@@ -130,7 +130,8 @@ def _orders(
     sides = ("",) if len(designs) == 1 else (", initial", ", final")
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
     selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
-    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. orders.csv has all points."
+    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. "
+    note += "orders.csv has every order at every operating point."
     units = ", ".join(dict.fromkeys(unit for unit, _ in units_of_names))
     return Table(head, rows, title=f"{title} at {result.problem.points[k].name} [{units}]", note=note)
 
