@@ -152,7 +152,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "norms": {"rmq": "root_mean_quad", "worst mean": "worst_mean"},
     "layouts": {"delta": "delta", "rotary": "rotary"},
-    "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker"},
+    "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker", "rhombic": "rhombic"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")
     | dict.fromkeys(_OF_PISTONS, "piston_motion")

@@ -16,7 +16,7 @@ from laufruhe.python.keys import describe
 
 def inline(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -32,9 +32,9 @@ def inline(
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout inline. Single bank with a throw for every cylinder."""
     return engine_of(locals(), {"layout": "inline"})
@@ -42,7 +42,7 @@ def inline(
 
 def vee(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -60,9 +60,9 @@ def vee(
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout vee. Two banks with a throw for each pair of cylinders."""
     return engine_of(locals(), {"layout": "vee"})
@@ -70,7 +70,7 @@ def vee(
 
 def boxer(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -87,9 +87,9 @@ def boxer(
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout boxer. Opposed banks with a throw for every cylinder."""
     return engine_of(locals(), {"layout": "boxer"})
@@ -97,7 +97,7 @@ def boxer(
 
 def opposed_piston(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -116,9 +116,9 @@ def opposed_piston(
     coupler_length: Value | None = None, rocker_arm: Value | None = None, rocker_end: Value | None = None,
     piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout opposed-piston. Inline layout with a second crank above."""
     return engine_of(locals(), {"layout": "opposed-piston"})
@@ -126,7 +126,7 @@ def opposed_piston(
 
 def radial(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -141,9 +141,9 @@ def radial(
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout radial.
 
@@ -154,7 +154,7 @@ def radial(
 
 def x_engine(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -171,9 +171,9 @@ def x_engine(
     coupler_length: Value | None = None, rocker_arm: Value | None = None, rocker_end: Value | None = None,
     piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout x-engine.
 
@@ -184,7 +184,7 @@ def x_engine(
 
 def parts(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -195,9 +195,9 @@ def parts(
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout parts. Layout by a free list of slider-cranks, each with its own position."""
     return engine_of(locals(), {"layout": "parts"})
@@ -205,7 +205,7 @@ def parts(
 
 def delta(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
     rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
     rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
@@ -219,9 +219,9 @@ def delta(
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of layout delta. Two-stroke engine with rows of three cylinders in a triangle."""
     return engine_of(locals(), {"layout": "delta"})
@@ -249,7 +249,7 @@ def engine(
     catalogue: str, *,
     layout: Literal["inline", "vee", "boxer", "opposed-piston", "radial", "x-engine", "parts", "delta",
         "rotary"] | None = None,
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "swinging-yoke"] | None = None,
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     cycle: Literal["two-stroke", "four-stroke"] | None = None, cylinders: int | None = None, bore: Value | None = None,
     stroke: Value | None = None, rod_ratio: Value | None = None, rod_length: Value | None = None,
     offset: Value | None = None, reciprocating_mass: Value | None = None, rotating_mass: Value | None = None,
@@ -275,9 +275,9 @@ def engine(
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, pivot_distance: Value | None = None, return_ratio: Value | None = None,
-    lever_length: Value | None = None, lever: Table | None = None, lever_weight: Value | None = None,
-    lever_weight_radius: Value | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
 ) -> EngineDraft:
     """Return an engine of the catalogue; arguments replace its numbers."""
     return engine_of(locals(), {})

@@ -84,6 +84,8 @@ def _check(inputs: LayoutInput) -> None:
     master, knuckle_angles = options["master_cylinder"] or 1, options["knuckle_angles"]
     if options["knuckle_radius"] is None:
         raise KeyedError("knuckle_radius", "is missing; add it, 0 mm puts all rods on the crank pin")
+    if type(inputs.mechanism.part) is not SliderCrank:
+        raise KeyedError("drive", "moves more than a piston, and this layout needs a master rod; leave it out")
     if math.isinf(inputs.mechanism.part.rod_length):
         raise KeyedError("rod_ratio", "makes a Scotch yoke, which has no master rod; give more", "0")
     if master > count:
