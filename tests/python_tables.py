@@ -240,7 +240,7 @@ def parts_module() -> str:
         'class EngineParts(Parts):\n    """Methods that add a table of a problem file to an engine; each returns a new '
         'engine."""\n\n'
     )
-    extra = {"laufruhe.python.keys": ("Parts", "describe", "keys_of")}
+    extra = {"laufruhe.python.keys": ("Parts", "describe", "keys_of"), "laufruhe.problem.goals": ("QuantityName",)}
     return module(
         "Parts and settings of an engine in code.",
         "\n".join([head + calls[0], *calls[1:], "\ndescribe(vars(EngineParts))\n"]),

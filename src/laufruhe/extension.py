@@ -140,6 +140,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "running_gear": "sizes",
         "crankcase": "workshop",
         "receivers": "receivers",
+        "speed_ranges": "speed_ranges",
         "frame": "receivers",
         "choices": "parts_lists",
         "parts_price": "parts_lists",

@@ -28,6 +28,7 @@ WANTED = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
     ("balance", "vee-eight-balance-job"): {"planes": "balance-job"},
     ("solve", "tractor-seat"): {"receivers": "tractor-seat-receivers"},
+    ("solve", "tractor-seat-speeds"): {"speed_ranges": "tractor-seat-speeds"},
     ("study", "tractor-study"): {name: f"tractor-study-{name}" for name in ("fig-10", "fig-22", "reciprocating-mass")},
     ("study", "torsion-pareto"): {"firing-order": "torsion-pareto"},
     ("study", "bearing-pareto"): {"mount-force": "bearing-pareto"},

@@ -70,6 +70,10 @@ class Extra:
         """Return the part whose loads are these changes of its numbers alone."""
         return self
 
+    def critical_frequencies(self, _engine: Any, /) -> Mapping[str, Sequence[float]]:
+        """Return the frequencies at which its response may have a peak or a jump [Hz], by what they are."""
+        return {}
+
     @property
     def labels(self) -> Sequence[str]:
         """Return the names that pictures may show."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, Self
 
+from laufruhe.problem.goals import QuantityName
 from laufruhe.problem.number_types import Array, Number, Table, Value, Values
 from laufruhe.python.keys import Parts, describe, keys_of
 
@@ -301,6 +302,24 @@ class EngineParts(Parts):
         Sizes of webs, rods, bolts and piston pins, from which their stresses follow.
         """
         return self._with("running_gear", "running_gear", keys_of(locals()))
+
+    def speed_range(
+        self, name: str, *, speed: Number, up_to: Number, mounts: Sequence[str] | None = None,
+        bearings: Sequence[str] | None = None, cylinders: Sequence[str] | None = None,
+        sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
+        receivers: Sequence[str] | None = None, electric_machines: Sequence[str] | None = None,
+        operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
+        direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+        motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
+        wanted: Number | None = None, frequency: Value | None = None, operating_point: str | None = None,
+        quantity: QuantityName | None = None, minimise: bool | None = None,
+        max: str | Sequence[Values] | Array | None = None, time_shares: str | Sequence[Values] | Array | None = None,
+    ) -> Self:
+        """Return the engine with a speed range.
+
+        A range of crank speeds over which the worst value of a quantity is found, minimised or limited.
+        """
+        return self._with("speed_ranges", "speed_range", keys_of(locals()))
 
     def torsion(
         self, *, throw_inertia: Value | Values, cylinder_damping: Value | Values | None = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self, TypeAlias
 
@@ -14,6 +14,7 @@ from laufruhe.machine import Block, Engine, Mount
 from laufruhe.machine.extra import Extra
 from laufruhe.machine.mount import Vector3
 from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.processes import call_by_name
 
 Quantity = Literal["acceleration", "velocity", "pressure"]
 
@@ -41,7 +42,16 @@ class FrequencyFunction:
         columns = np.array(self.values).T
         return np.stack([np.interp(frequencies, self.frequencies, column) for column in columns], axis=-1)
 
+    @property
+    def peaks(self) -> list[float]:
+        """Measured frequencies at which the amount of a value is larger than at both neighbours [Hz]."""
+        size = np.abs(np.array(self.values))
+        is_peak = ((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])).any(axis=1)
+        return [f for f, peak in zip(self.frequencies[1:-1], is_peak, strict=True) if peak]
 
+
+_EDGE = 1e-9
+"""Distance from the edge of a band, relative to its frequency."""
 Curve: TypeAlias = Weighting | FrequencyFunction | None
 """Weighting of one direction: of a standard, from a file, or none."""
 
@@ -115,6 +125,18 @@ class Receivers(Extra):
     def scaled(self, length: float, mass: float) -> Self:
         """Return the receivers with points at scaled positions; measured functions and the frame stay."""
         return replace(super().scaled(length, mass), frame=self.frame)
+
+    def critical_frequencies(self, engine: Engine, /) -> Mapping[str, Sequence[float]]:
+        """Return natural frequencies of engine and frame, and edges and peaks of measured functions [Hz]."""
+        physics = "laufruhe.extensions.receivers.physics:frame_frequencies"
+        edges = [edge for receiver in self.receivers for edge in receiver.band if 0.0 < edge < math.inf]
+        functions = [f for receiver in self.receivers for f in receiver.functions if f is not None]
+        return {
+            "natural frequency on the frame": () if self.frame is None else call_by_name(physics, self.frame, engine),
+            # the response jumps beside an edge
+            "edge of a band": [side * edge for edge in edges for side in (1.0 - _EDGE, 1.0 + _EDGE)],
+            "peak of a transfer function": [peak for function in functions for peak in function.peaks],
+        }
 
     @property
     def labels(self) -> Sequence[str]:

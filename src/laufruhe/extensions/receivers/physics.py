@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -116,6 +118,18 @@ def _motion_at(point: Vector3, centre: Vector3) -> Array:
     return np.asarray(point_motion(NUMBERS, np.array(point) - np.array(centre)))
 
 
+@lru_cache(maxsize=4)
+def _coupled(mounting: ElasticMounting, frame: Frame, modes: tuple[int, ...]) -> _Coupled:
+    return _Coupled(mounting, frame, mounting.modes.shapes[:, list(modes)])
+
+
+def frame_frequencies(frame: Frame, engine: Engine) -> list[float]:
+    """Return the natural frequencies of an engine on a frame without damping [Hz]; none on mounts without a block."""
+    if engine.block is None:
+        return []
+    return _coupled(elastic_mounting(engine.block, engine.mounts), frame, tuple(range(6))).frequencies
+
+
 @dataclass(frozen=True, eq=False)
 class _Motion:
     # motion of both bodies at their centres of gravity, shape (n, 6), and forces on the frame, shape (n, 3 mounts)
@@ -138,28 +152,66 @@ class _Coupled:
         fidelity = loads.fidelity
         if fidelity.mounts != "frequency" or engine.block is None:
             raise ModelError(f"a frame under the engine {_IN_FREQUENCY}")
-        mounting = elastic_mounting(engine.block, engine.mounts)
         modes = range(6) if fidelity.modes is None else [mode - 1 for mode in fidelity.modes]
-        return cls(mounting, frame, mounting.modes.shapes[:, list(modes)])
+        return _coupled(elastic_mounting(engine.block, engine.mounts), frame, tuple(modes))
+
+    def _at(self, position: Vector3) -> Array:
+        return _motion_at(position, self.frame.body.centre_of_gravity)
+
+    @cached_property
+    def travels(self) -> Array:
+        """Travel of every mount per motion of both bodies, shape (3 mounts, modes + 6)."""
+        feet = np.concatenate([self._at(mount.position) for mount in self.mounting.mounts])
+        return np.concatenate([np.concatenate(list(self.mounting.motions)) @ self.shapes, -feet], axis=1)
+
+    @cached_property
+    def inertia(self) -> Array:
+        """Inertia of both bodies, shape (modes + 6, modes + 6)."""
+        from scipy.linalg import block_diag
+
+        engine = self.shapes.T @ self.mounting.block.mass_matrix @ self.shapes
+        return np.asarray(block_diag(engine, self.frame.body.mass_matrix))
+
+    @cached_property
+    def _mounts(self) -> tuple[ComplexArray, ComplexArray]:
+        # complex stiffness of all mounts, and their viscous damping times i, shape (3 mounts, 3 mounts)
+        from scipy.linalg import block_diag
+
+        lossy = block_diag(*self.mounting.springs) + 1j * block_diag(*self.mounting.losses)
+        return np.asarray(lossy, dtype=complex), np.asarray(1j * block_diag(*self.mounting.dampers), dtype=complex)
+
+    @cached_property
+    def _stiffness(self) -> ComplexArray:
+        # complex stiffness of both bodies, shape (modes + 6, modes + 6)
+        still: ComplexArray = self.travels.T @ self._mounts[0] @ self.travels
+        for spring in self.frame.springs:
+            added = carried(self._at(spring.position), spring.stiffness_matrix + 1j * spring.loss_matrix)
+            still[-6:, -6:] += added
+        return still
+
+    @cached_property
+    def _damping(self) -> ComplexArray:
+        # viscous damping of both bodies times i, shape (modes + 6, modes + 6)
+        moving: ComplexArray = self.travels.T @ self._mounts[1] @ self.travels
+        for spring in self.frame.springs:
+            moving[-6:, -6:] += 1j * carried(self._at(spring.position), spring.damping_matrix)
+        return moving
+
+    @property
+    def frequencies(self) -> list[float]:
+        """Natural frequencies of both bodies without damping [Hz]."""
+        from scipy.linalg import eigh
+
+        squares = eigh(self._stiffness.real, self.inertia, eigvals_only=True)
+        # a free body has frequencies of rounding errors
+        return [math.sqrt(square) / math.tau for square in squares.tolist() if square > 1e-9 * squares[-1]]
 
     def solved(self, omegas: Array, wrenches: ComplexArray) -> _Motion:
         """Return the motion under wrenches about the origin, shape (n, 6), at positive angular frequencies [rad/s]."""
-        from scipy.linalg import block_diag
-
-        mounting, centre, count = self.mounting, self.frame.body.centre_of_gravity, self.shapes.shape[1]
-        feet = np.concatenate([_motion_at(mount.position, centre) for mount in mounting.mounts])
-        # travel of every mount per motion of both bodies
-        travels = np.concatenate([np.concatenate(list(mounting.motions)) @ self.shapes, -feet], axis=1)
-        inertia = block_diag(self.shapes.T @ mounting.block.mass_matrix @ self.shapes, self.frame.body.mass_matrix)
-        lossy = block_diag(*mounting.springs) + 1j * block_diag(*mounting.losses)
-        viscous = 1j * block_diag(*mounting.dampers)
-        still, moving = (travels.T @ part @ travels for part in (lossy, viscous))
-        for spring in self.frame.springs:
-            at = _motion_at(spring.position, centre)
-            still[count:, count:] += carried(at, spring.stiffness_matrix + 1j * spring.loss_matrix)
-            moving[count:, count:] += 1j * carried(at, spring.damping_matrix)
+        mounting, count = self.mounting, self.shapes.shape[1]
+        travels, lossy, viscous = self.travels, *self._mounts
         w = omegas[:, None, None]
-        impedance = still + w * moving - w**2 * inertia
+        impedance: Any = self._stiffness + w * self._damping - w**2 * self.inertia
         laws, axes = mounting.dynamic, mounting.dynamic.directions
         if laws:
             impedance += np.einsum("wn,ni,nj->wij", laws.added(omegas), axes.T @ travels, axes.T @ travels)

@@ -15,6 +15,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.extra import Extra
 from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.processes import call_by_name
 from laufruhe.physics.torque import reduced_inertia
 from laufruhe.problem.decision import Kind
 
@@ -294,6 +295,11 @@ class Torsion(Extra):
         """Return the inertia of all discs without pistons and rods [kg m2] (V14); rings of absorbers slip."""
         swinging = sum(reduced_inertia(part) - part.rotating_mass * part.crank_radius**2 for part in parts)
         return sum(disc.inertia * disc.ratio**2 for disc in self.discs) - swinging
+
+    def critical_frequencies(self, _engine: Any, /) -> Mapping[str, Sequence[float]]:
+        """Return the natural frequencies of the crankshaft's twist [Hz]."""
+        modes = call_by_name("laufruhe.extensions.torsion.physics:natural_modes", self)
+        return {"natural frequency of twist": modes.frequencies.tolist()}
 
     @property
     def labels(self) -> Sequence[str]:

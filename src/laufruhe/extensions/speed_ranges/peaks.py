@@ -1,0 +1,143 @@
+"""Response of a design over a speed range, with its peaks found between samples (P23).
+
+Samples stand at equal ratios of speed, at the kinks of limit and time shares, and wherever an order that counts meets
+a natural frequency or another critical frequency of the engine. Each sample that is higher than its neighbours, and
+high enough to hold the largest value between them, is the middle of a bracket, in which Brent's method finds the peak.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.extensions.speed_ranges.ranges import SpeedRange
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.present.numbers import RPM
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.problem import Problem
+
+SAMPLES, COARSE, BLOCK, FINE = 160, 9, 40, 4000
+"""Speeds at equal ratios, those where orders are compared, those evaluated at once, and those of the mean."""
+COUNTS, NEAR = 1e-3, 0.6
+"""Share of the largest amplitude from which an order counts, and of the highest sample that may hold the peak."""
+BRACKET = 1e-9
+"""Width of the last bracket, relative to speed."""
+
+
+class Response:
+    """Values of a measure of one design over a speed range.
+
+    Attributes
+    ----------
+    speeds, values, limits
+        Crank speeds in ascending order [rad/s], values and limits there [SI], shape (n,).
+    tops
+        Indices of the peaks, those with the largest share of the limit first, or of the largest value without a limit.
+    """
+
+    def __init__(self, problem: Problem, evaluation: Evaluation, span: SpeedRange) -> None:
+        self.span, self.measure = span, span.measure_of(problem)
+        self._problem, self._evaluation = problem.at(evaluation.fidelity), evaluation
+        samples = self._samples()
+        known: dict[float, float] = dict(zip(samples.tolist(), self._values(samples.tolist()), strict=True))
+
+        def share(speed: float) -> float:
+            if speed not in known:
+                (known[speed],) = self._values([speed])
+            return known[speed] / (1.0 if span.limit is None else float(np.interp(speed, *span.limit)))
+
+        shares = np.array([share(speed) for speed in samples.tolist()])
+        padded = np.concatenate([[-math.inf], shares, [-math.inf]])
+        is_top = (shares >= padded[:-2]) & (shares >= padded[2:]) & (shares >= NEAR * shares.max())
+        peaks = {_peak(share, samples, k) for k in np.flatnonzero(is_top).tolist()}
+        self.speeds, self.values = (np.array(column) for column in zip(*sorted(known.items()), strict=True))
+        self.limits = span.limits_at(self.speeds)
+        self.tops = [int(np.searchsorted(self.speeds, speed)) for speed in sorted(peaks, key=share, reverse=True)]
+
+    def _samples(self) -> Array:
+        low, high, curves = self.span.low, self.span.high, (self.span.limit, self.span.shares)
+        orders, sizes = self.amplitudes(np.geomspace(low, high, COARSE))
+        largest = sizes.max(axis=0)
+        counted = orders[(largest > COUNTS * largest.max()) & (orders > 0.0)]
+        frequencies = np.array([f for values in self.frequencies.values() for f in values])
+        critical = np.divide.outer(math.tau * frequencies, counted).reshape(-1)
+        kinks = [speed for curve in curves if curve is not None for speed in curve[0]]
+        samples = np.concatenate([np.geomspace(low, high, SAMPLES)[1:-1], critical, kinks, [low, high]])
+        return np.unique(samples[(samples >= low) & (samples <= high)])
+
+    def _evaluated(self, speeds: Sequence[float]) -> Evaluation:
+        points = tuple(self.span.at(speeds, [loads.point for loads in self._evaluation.loads]))
+        return evaluate(replace(self._problem, points=points), self._evaluation.engine, self._evaluation.samples)
+
+    def _values(self, speeds: Sequence[float]) -> list[float]:
+        values: list[float] = []
+        for start in range(0, len(speeds), BLOCK):
+            evaluation = self._evaluated(speeds[start : start + BLOCK])
+            values += [replace(evaluation, loads=(loads,)).value(self.measure) for loads in evaluation.loads]
+        if not np.all(np.isfinite(values)):
+            speed = RPM * speeds[int(np.argmin(np.isfinite(values)))]
+            rule = f"crosses a resonance at {speed:.4g} rpm, and nothing damps it"
+            raise ModelError(f"speed range '{self.span.name}' {rule}; give mounts or frame a loss factor or damping")
+        return values
+
+    def amplitudes(self, speeds: Array) -> tuple[Array, Array]:
+        """Return orders, shape (n,), and the largest amplitude of each at crank speeds [SI], shape (speeds, n)."""
+        evaluation = self._evaluated(speeds.tolist())
+        signals = [self.measure.signal(loads, evaluation.engine) for loads in evaluation.loads]
+        return signals[0].orders, np.array([order_amplitude(one.coefficients).max(axis=1) for one in signals])
+
+    @cached_property
+    def frequencies(self) -> Mapping[str, Sequence[float]]:
+        """Critical frequencies [Hz] by what they are: on the mounts, and those of parts of extensions."""
+        engine = self._evaluation.engine
+        on_mounts = mounting_in(engine).modes.frequencies.tolist() if engine.block is not None else []
+        parts = [item for extra in engine.extras for item in extra.critical_frequencies(engine).items()]
+        return {"natural frequency on the mounts": [f for f in on_mounts if f > 0.0], **dict(parts)}
+
+    @property
+    def worst(self) -> int:
+        """Index of the largest value."""
+        return int(np.argmax(self.values))
+
+    @property
+    def tightest(self) -> int:
+        """Index of the largest share of the limit."""
+        return int(np.argmax(self.values / self.limits))
+
+    @property
+    def ratio(self) -> float:
+        """Largest value over its limit; zero without a limit."""
+        return float(np.max(self.values / self.limits))
+
+    @cached_property
+    def strongest(self) -> tuple[float, float]:
+        """Order with the largest amplitude at the largest value, and its amplitude [SI]."""
+        orders, sizes = self.amplitudes(self.speeds[[self.worst]])
+        return float(orders[np.argmax(sizes[0])]), float(sizes[0].max())
+
+    @property
+    def mean(self) -> float:
+        """Mean value over time, with monotone cubics between the speeds [SI]."""
+        from scipy.interpolate import PchipInterpolator
+
+        speeds = np.union1d(self.speeds, np.linspace(self.span.low, self.span.high, FINE))
+        values = PchipInterpolator(self.speeds, self.values)(speeds)
+        weights = np.ones(len(speeds)) if self.span.shares is None else np.interp(speeds, *self.span.shares)
+        return float(np.trapezoid(weights * values, speeds) / np.trapezoid(weights, speeds))
+
+
+def _peak(share: Callable[[float], float], samples: Array, k: int) -> float:
+    # speed of the largest value between the neighbours of sample k [rad/s]
+    from scipy.optimize import minimize_scalar
+
+    low, high = float(samples[max(k - 1, 0)]), float(samples[min(k + 1, len(samples) - 1)])
+    peak = minimize_scalar(lambda s: -share(float(s)), bounds=(low, high), method="bounded",
+                            options={"xatol": BRACKET * high})  # fmt: skip
+    return max((float(samples[k]), float(peak.x)), key=share)
