@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from laufruhe.errors import InputError
+from laufruhe.extensions.twins import picture as twins
 from laufruhe.files.reader import load, load_tables
 from laufruhe.machine.crank_names import CRANKS, name_of_crank
 from laufruhe.physics.rigid_body import turning_parts
-from laufruhe.plots.results import twins
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
 from problem_files import PROBLEMS, changed, loaded

@@ -46,7 +46,7 @@ def size_of(path: Path) -> tuple[int, int]:
     [
         (scenes.TIGHT, ["engine", "polar", "ellipses", "cycle", "bars", "spectrum"]),
         (scenes.TWO_POINTS, ["engine", "polar", "cycle", "bars", "spectrum"]),
-        (scenes.PARTS, ["engine", "twins", "polar", "ellipses", "cycle", "bars", "spectrum"]),
+        (scenes.PARTS, ["engine", "polar", "ellipses", "cycle", "bars", "spectrum", "twins"]),
         (scenes.SHAKING_ONLY, ["engine", "ellipses", "cycle", "spectrum"]),
     ],
 )

@@ -1,23 +1,20 @@
-"""Curves that pictures and tables share: indicator diagrams, transmissibility over speed, turning parts of twins."""
+"""Curves that pictures and tables share: indicator diagrams, and transmissibility over speed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Chambers, Engine, OperatingPoint, SliderCrank
+from laufruhe.machine import Chambers, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.physics.cylinder_volume import swept_volume
-from laufruhe.physics.rigid_body import turning_parts
-from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import speed_map, split_loads
 from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
-from laufruhe.present.measures import hardest_point, has_loads
+from laufruhe.present.measures import has_loads
 from laufruhe.present.mounting import critical_speed, excited_frequencies, facts_of, main_order
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
@@ -89,33 +86,3 @@ def transmissibility_of(
     for k, order in enumerate(orders):
         for column in np.flatnonzero(orders_equal(field.orders, order))[:1]:
             yield k, curves[:, column]
-
-
-ORDERS = {1: "primary", 2: "secondary"}
-KINDS = {"force": ((1, 2), "N"), "couple": ((4, 5), "N m")}
-"""Lateral and vertical columns of the wrench, and unit."""
-NEXT_TO_NOTHING = 1e-6
-Parts: TypeAlias = dict[tuple[str, int], tuple[complex, complex]]
-
-
-def is_twin(result: Result) -> bool:
-    """Return True for a twin: an engine of two cylinders with loads of first or second order."""
-    engine = result.final.engine
-    if len(engine.cylinders) != 2 or not has_loads(result):
-        return False
-    k = hardest_point(result)
-    initial, final = (
-        abs(np.array([*parts_of(result, design_engine, k).values()]))
-        for design_engine in (result.initial.engine, engine)
-    )
-    return bool(final.max() > NEXT_TO_NOTHING * max(initial.max(), final.max()))
-
-
-def parts_of(result: Result, engine: Engine, k: int) -> Parts:
-    """Return the parts of force and couple that turn forward and backward, by order, at an operating point."""
-    wrench = shaking_loads(engine, result.problem.points[k], result.problem.fidelity)
-    return {
-        (kind, order): turning_parts(*wrench.at(order)[list(columns)])
-        for kind, (columns, _) in KINDS.items()
-        for order in ORDERS
-    }

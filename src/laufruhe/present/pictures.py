@@ -30,7 +30,6 @@ _CAPTIONS = {
     "engine": "The engine to scale, from the front and from the side; open or optimised parts are marked.",
     "star": "The best crank stars, from the front and from the side.",
     "firings": "Firing orders of the best stars over one working cycle.",
-    "twins": "Firings of a twin, and the parts of its first and second order that turn forward and backward.",
     "polar": "Force on each mount over one cycle: path of the force vector, or one component over the crank angle.",
     "ellipses": "Mass ellipses: path of the free force and of the free couple of each order.",
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",

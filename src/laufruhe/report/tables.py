@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import astuple, fields
@@ -19,10 +18,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.torque import excess_torque, swing_of, torque_parts, turning_inertia
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.present.curves import (
-    KINDS,
     indicator_of,
-    is_twin,
-    parts_of,
     points_with_chambers,
     transmissibility_of,
     transmissibility_speeds,
@@ -244,19 +240,6 @@ def _wear(result: Result) -> Table:
     return Table(head, rows)
 
 
-def _turning(result: Result) -> Table:
-    rows = [
-        [name, point.name, kind, order, abs(forward), math.degrees(cmath.phase(forward)), abs(backward),
-         math.degrees(cmath.phase(backward)), KINDS[kind][1]]
-        for name, design in designs_with_loads(result).items()
-        for k, point in enumerate(result.problem.points)
-        for (kind, order), (forward, backward) in parts_of(result, design.engine, k).items()
-    ]  # fmt: skip
-    head = ["design", "point", "load", "order", "forward", "forward angle [deg]", "backward", "backward angle [deg]",
-            "unit"]  # fmt: skip
-    return Table(head, rows)
-
-
 def _mount_criticals(result: Result) -> Table:
     rows = []
     for name, design in designs_with_loads(result).items():
@@ -320,7 +303,6 @@ _TABLES: NumberTables = {
     "willans": (lambda result: result.problem.friction, _willans),
     "bearings-on-crank": (has_bearings, _on_crank),
     "wear": (has_bearings, _wear),
-    "turning-parts": (is_twin, _turning),
     "mount-critical-speeds": (is_elastic, _mount_criticals),
     "mounts": (is_elastic, _mounts),
     "mounting": (is_elastic, _mounting),

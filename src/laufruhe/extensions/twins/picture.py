@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from laufruhe.extensions.twins.turning import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.plots.style import BLUE, VERMILION, entry, finish_page, page, point_name, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN, in_thousands
-from laufruhe.present.curves import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.present.measures import firing_words, hardest_point
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
