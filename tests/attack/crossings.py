@@ -77,7 +77,7 @@ def at_a_share(rng: Generator, table: Table, told: Table) -> Table:
     low, high = own.box.T
     has = own.designs(low + (high - low) * rng.random((20, len(low)))).measure(told)
     maximum = has[0] * rng.uniform(1.0, 1.1) if rng.random() < 0.6 else np.quantile(has, rng.uniform(0.05, 0.4))
-    unit = {"transmissibility": "", "static sag": "m"}[told["quantity"]]
+    unit = {"transmissibility": "", "static sag": "m", "motion frequencies": "Hz"}[told["quantity"]]
     rest = {key: value for key, value in told.items() if key != "quantity"}
     return {
         "limit": told["quantity"], "max": q(float(maximum), unit, 9) if unit else float(f"{maximum:.9g}"), "name": "l0",
@@ -108,6 +108,16 @@ def sag_and_weights(rng: Generator) -> Table:
     table["objective"] = objective(asked_load(rng, table))
     limit = at_a_share(rng, table, {"quantity": "static sag"})
     return {**table, "constraints": [limit], "search": {"boxes": 20, "starts": 5}}
+
+
+def motion_frequency_and_stiffness(rng: Generator) -> Table:
+    """Stiffness under a limit on the frequency of a motion, which no bound knows."""
+    table = scene(rng, 2, True)
+    open_numbers(rng, table, ["stiffness"] * int(rng.integers(1, 4)))
+    table["objective"] = objective(asked_load(rng, table))
+    motion = str(rng.choice(["roll", "bounce", "pitch", "lateral"]))
+    limit = at_a_share(rng, table, {"quantity": "motion frequencies", "motions": [motion]})
+    return {**table, "constraints": [limit], "search": {"starts": 5}}
 
 
 # --- judged by the plain model
@@ -234,6 +244,7 @@ OWN_CROSSINGS = {
     "transmissibility and weights": transmissibility_and_weights,
     "damper and weights": damper_and_weights,
     "sag and weights beside stiffness": sag_and_weights,
+    "motion frequency and stiffness": motion_frequency_and_stiffness,
 }
 CROSSINGS = {**PLAIN_CROSSINGS, **OWN_CROSSINGS}
 

@@ -371,6 +371,10 @@ class Designs:
             if channel == "kinetic-energy decoupling":
                 return shares.min(axis=1)
             return np.maximum(float(asked.get("wanted", 1.0)) - shares, 0.0).sum(axis=1)
+        if channel == "motion frequencies":
+            frequencies, shares = b.modes
+            dominant = shares.argmax(axis=2)[:, [MOTIONS.index(m) for m in asked.get("motions", MOTIONS)]]
+            return np.take_along_axis(frequencies, dominant, axis=1).max(axis=1)
         if channel == "static sag":
             return b.sag
         if channel == "total stiffness":
