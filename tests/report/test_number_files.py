@@ -96,6 +96,15 @@ def test_orders_are_those_of_the_curves(result: Result, folder: Path) -> None:
         assert own[order] == pytest.approx(found[int(2 * order)], rel=1e-6)
 
 
+def test_all_orders_that_are_not_zero_are_listed(result: Result, folder: Path) -> None:
+    orders = pd.read_csv(folder / "orders.csv")
+    numbers = orders.drop(columns=["point", "order", *orders.filter(like="frequency")])
+    assert (numbers.ne(0.0).any(axis=1) | (orders["order"] == 0.0)).all()
+    for point, loads in zip(result.problem.points, result.final.loads, strict=True):
+        present = loads.wrench.orders[loads.wrench.coefficients.any(axis=1)]
+        assert {0.0, *present} <= {*orders.loc[orders["point"] == point.name, "order"]}
+
+
 def test_components_by_order_make_the_curves(result: Result, folder: Path) -> None:
     """Compare each curve with the sum of its orders: amplitude times cosine of order times angle plus phase."""
     curves, orders = (pd.read_csv(folder / f"{name}.csv") for name in ("forces", "orders"))

@@ -130,6 +130,13 @@ DIRECTIONS = 180
 TURN = math.tau * np.arange(STEPS) / STEPS
 
 
+def _orders(result: Result) -> Table:
+    designs = designs_with_loads(result)
+    table = Table.from_fields(orders_with_phases(designs))
+    # point, order and the frequency of each design say nothing about the amplitudes
+    return Table(table.head, [row for row in table.rows if row[1] == 0.0 or any(row[2 : -len(designs)])])
+
+
 def _torque(result: Result) -> Table:
     points, fidelity = result.problem.points, result.problem.fidelity
     angles = result.final.engine.cycle.angle * np.arange(STEPS) / STEPS
@@ -293,7 +300,7 @@ _TABLES: NumberTables = {
             forces_of(designs_with_loads(result), max(min(STEPS, MAX_ROWS // len(result.problem.points)), 36))
         ),
     ),
-    "orders": (has_loads, lambda result: Table.from_fields(orders_with_phases(designs_with_loads(result)))),
+    "orders": (has_loads, _orders),
     "modes": (is_elastic, lambda result: Table.from_fields(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),
     "rankings": (has_ranking, _rankings),
