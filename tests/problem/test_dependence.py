@@ -53,6 +53,9 @@ CONSTANT_HERE = (
     ),
     ("none", "share", "main-bearing pressure times speed, surging force, swaying couple"),
     ("none", "place", "shaking force, surging force"),
+    # pistons share no chamber, so a lead turns all loads of a cylinder alike
+    ("none", "lead", "side-force reversal rate"),
+    ("affine", "lead", "side-force reversal rate"),
     # the file gives the time of the run-up
     ("none", "flywheel", "run-up force, run-up travel, run-up twist"),
     ("affine", "flywheel", "run-up force, run-up travel, run-up twist"),
