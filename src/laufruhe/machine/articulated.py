@@ -74,8 +74,60 @@ class Knuckle:
         return float(abs(reach - place))
 
 
+class PinDriven(SliderCrank):
+    """Mechanism whose piston follows a moving pin by a rod; subclasses give this pin and the dead centres."""
+
+    @property
+    def piston_rod(self) -> tuple[float, float]:
+        """Length of the piston rod, and height of the piston's path above the cylinder axis of C5 [m]."""
+        return self.rod_length, self.offset
+
+    def driving_pin(self, lib: Any, alpha: Any) -> tuple[Any, Any, Any]:
+        """Return the position of the pin that drives the rod, and its first two derivatives by alpha [m]."""
+        raise NotImplementedError(type(self).__name__)
+
+    @property
+    def fires_at(self) -> float:
+        """Local crank angle of the true dead centre [rad]."""
+        return self.dead_centres[0]
+
+    @property
+    def stroke(self) -> float:
+        """Distance between the dead centres [m]; that of a hinged rod differs a little from the master's."""
+        top, bottom = self.dead_centres
+        return float(self.travel(np, np.float64(bottom)) - self.travel(np, np.float64(top)))
+
+    def travel(self, lib: Any, alpha: Any) -> Any:
+        """Return the piston travel towards the crank from alpha = 0 [m]."""
+        return self.piston(lib, 0.0 * alpha)[0][0] - self.piston(lib, alpha)[0][0]
+
+    def velocity(self, lib: Any, alpha: Any) -> Any:
+        """Return the velocity of the piston away from the crank, by the angle of its crank [m]."""
+        return self.piston(lib, alpha)[0][1]
+
+    def piston(self, lib: Any, alpha: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any]]:
+        """Return piston position with two derivatives along its axis, and rate and acceleration of its rod (K12)."""
+        (place, velocity, acceleration), (length, offset) = self.driving_pin(lib, alpha), self.piston_rod
+        rod = 0.0 * alpha + length
+        sine = (place.imag - offset) / rod
+        cosine = lib.sqrt((1.0 - sine) * (1.0 + sine))
+        rate = velocity.imag / (rod * cosine)
+        swing = (acceleration.imag / rod + rate * rate * sine) / cosine
+        return (
+            place.real + rod * cosine,
+            velocity.real - rod * rate * sine,
+            acceleration.real - rod * (swing * sine + rate * rate * cosine),
+        ), (-rate, -swing)
+
+    def rod_lean(self, lib: Any, alpha: Any) -> tuple[Any, Any]:
+        """Return sine and cosine of the angle chi between rod and cylinder axis (K12)."""
+        length, offset = self.piston_rod
+        sine = (self.driving_pin(lib, alpha)[0].imag - offset) / (0.0 * alpha + length)
+        return sine, lib.sqrt((1.0 - sine) * (1.0 + sine))
+
+
 @dataclass(frozen=True, kw_only=True)
-class ArticulatedCrank(SliderCrank):
+class ArticulatedCrank(PinDriven):
     """A cylinder whose rod works on a knuckle pin; `rotating_mass` is the rod's share at that pin."""
 
     knuckle: Knuckle
@@ -96,40 +148,15 @@ class ArticulatedCrank(SliderCrank):
         hinge = (self.knuckle.radius, self.knuckle.angle, self.bank - master.bank)
         return (*super().path, *hinge, master.path)  # type: ignore[misc]
 
-    @property
-    def fires_at(self) -> float:
-        """Local crank angle of the true dead centre [rad]."""
-        return self.dead_centres[0]
-
     @cached_property
     def dead_centres(self) -> tuple[float, float]:
         """Local crank angles of the highest and lowest piston position [rad] (K13)."""
         first, last = (_root(lambda alpha: float(self.velocity(np, alpha)), start) for start in (0.0, math.pi))
         return first, last
 
-    @property
-    def stroke(self) -> float:
-        """Distance between the dead centres [m]; it differs a little from the stroke of the master cylinder."""
-        top, bottom = self.dead_centres
-        return float(self.travel(np, bottom) - self.travel(np, top))
-
-    def travel(self, lib: Any, alpha: Any) -> Any:
-        """Return the piston travel towards the crank from alpha = 0 [m]."""
-        return self._piston(lib, 0.0 * alpha)[0][0] - self._piston(lib, alpha)[0][0]
-
-    def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Return the velocity of the piston away from the crank, by the angle of its crank [m]."""
-        return self._piston(lib, alpha)[0][1]
-
-    def _piston(self, lib: Any, alpha: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any]]:
-        pin = self.knuckle.motion(lib, alpha, self.bank)
-        return kinematics.piston_on_pin(lib, pin, 0.0 * alpha + self.rod_length, self.offset)
-
-    def rod_lean(self, lib: Any, alpha: Any) -> tuple[Any, Any]:
-        """Return sine and cosine of the angle chi between rod and cylinder axis (K12)."""
-        place, _, _ = self.knuckle.motion(lib, alpha, self.bank)
-        sine = (place.imag - self.offset) / (0.0 * alpha + self.rod_length)
-        return sine, lib.sqrt((1.0 - sine) * (1.0 + sine))
+    def driving_pin(self, lib: Any, alpha: Any) -> tuple[Any, Any, Any]:
+        """Return the motion of the knuckle pin (K11)."""
+        return self.knuckle.motion(lib, alpha, self.bank)
 
     @property
     def master_bank(self) -> float:
@@ -156,7 +183,7 @@ class ArticulatedCrank(SliderCrank):
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
         """Return the motion of piston, rod and knuckle pin, less the mass that is counted at the crank pin."""
-        (place, velocity, acceleration), rod = self._piston(lib, alpha)
+        (place, velocity, acceleration), rod = self.piston(lib, alpha)
         radius = 0.0 * alpha + self.crank_radius
         pin = radius * (lib.cos(alpha) + 1j * lib.sin(alpha))
         return Motion(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Rod:
@@ -75,3 +77,10 @@ class Outline:
     points: Any
     width: float
     moves: bool
+
+
+def bar(first: complex, last: complex, width: float) -> Any:
+    """Return the corners of a bar between two points, as long as their distance [m]."""
+    along = 0.5 * (last - first)
+    across = 0.5j * width * along / abs(along)
+    return first + along * np.array([2, 2, 0, 0]) + across * np.array([1, -1, -1, 1])

@@ -65,30 +65,3 @@ def piston_acceleration(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any 
     sine = rod_ratio * height - offset_ratio
     cosine = _cosine(lib, sine)
     return -turning + height * sine / cosine - rod_ratio * turning * turning / (cosine * cosine * cosine)
-
-
-def piston_on_pin(lib: Any, pin: tuple[Any, Any, Any], length: Any, offset: Any) -> tuple[
-    tuple[Any, Any, Any], tuple[Any, Any]
-]:  # fmt: skip
-    """Return piston position with two derivatives along its axis, and rate and acceleration of its rod (K12).
-
-    Parameters
-    ----------
-    pin
-        Position of the pin that drives the rod with its first two derivatives, complex, in the plane whose real axis is
-        that of the cylinder.
-    length
-        Length of the rod.
-    offset
-        Height of the piston's path above that axis.
-    """
-    place, velocity, acceleration = pin
-    sine = (place.imag - offset) / length
-    cosine = _cosine(lib, sine)
-    rate = velocity.imag / (length * cosine)
-    swing = (acceleration.imag / length + rate * rate * sine) / cosine
-    return (
-        place.real + length * cosine,
-        velocity.real - length * rate * sine,
-        acceleration.real - length * (swing * sine + rate * rate * cosine),
-    ), (-rate, -swing)

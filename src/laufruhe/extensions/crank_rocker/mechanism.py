@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.bodies import Motion, Outline
-from laufruhe.machine.kinematics import piston_on_pin
+from laufruhe.machine.articulated import PinDriven
+from laufruhe.machine.bodies import Motion, Outline, bar
 from laufruhe.machine.slider_crank import SliderCrank
 
 LINKS = "coupler", "rocker", "piston_rod"
@@ -20,7 +20,7 @@ _STEPS = 360
 
 
 @dataclass(frozen=True, kw_only=True)
-class CrankRocker(SliderCrank):
+class CrankRocker(PinDriven):
     """Crank that swings a rocker by a coupler; a rod joins the other end of the rocker and the piston.
 
     Positions are in the plane turned to the cylinder axis (C5), with the crank axis at zero.
@@ -79,9 +79,9 @@ class CrankRocker(SliderCrank):
         return "crank-rocker", self.crank_radius, *linkage, self.piston_rod_length, self.piston_offset
 
     @property
-    def fires_at(self) -> float:
-        """Local crank angle of the highest piston position [rad]."""
-        return self.dead_centres[0]
+    def piston_rod(self) -> tuple[float, float]:
+        """Length of the piston rod, and height of the piston's path across the axis [m]."""
+        return self.piston_rod_length, self.piston_offset
 
     @cached_property
     def dead_centres(self) -> tuple[float, float]:
@@ -90,19 +90,13 @@ class CrankRocker(SliderCrank):
         for reach in (self.coupler_length + self.crank_radius, self.coupler_length - self.crank_radius):
             cosine = (self.arm**2 + distance**2 - reach**2) / (2.0 * self.arm * distance)
             turned = complex(cosine, -self.side * math.sqrt(max(1.0 - cosine * cosine, 0.0)))
-            pin = math.copysign(1.0, reach) * self.pivot * (1.0 - self.arm / distance * turned)
+            pin = self.pivot * (1.0 - self.arm / distance * turned)
             angles.append(math.atan2(pin.imag, pin.real))
         outer, inner = angles[0], angles[1] + math.pi
         is_outer = self.travel(np, np.float64(outer)) < self.travel(np, np.float64(inner))
         top, bottom = (outer, inner) if is_outer else (inner, outer)
         top = math.remainder(top, math.tau)
         return top, top + (bottom - top) % math.tau
-
-    @property
-    def stroke(self) -> float:
-        """Distance between the dead centres [m]."""
-        top, bottom = (float(self.travel(np, np.float64(alpha))) for alpha in self.dead_centres)
-        return bottom - top
 
     def links(self, lib: Any, alpha: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any]]:
         """Return rocker and coupler over the crank angle (K22).
@@ -129,22 +123,14 @@ class CrankRocker(SliderCrank):
         arm = place * direction
         return self.pivot + arm, 1j * rate * arm, (1j * swing - rate * rate) * arm
 
-    def _piston(self, lib: Any, alpha: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any]]:
-        end = self._on_rocker(self.links(lib, alpha)[0], self.end)
-        return piston_on_pin(lib, end, 0.0 * alpha + self.piston_rod_length, self.piston_offset)
-
-    def travel(self, lib: Any, alpha: Any) -> Any:
-        """Return the piston travel towards the crank from alpha = 0 [m]."""
-        return self._piston(lib, 0.0 * alpha)[0][0] - self._piston(lib, alpha)[0][0]
-
-    def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Return the velocity of the piston away from the crank, per crank angle [m/rad]."""
-        return self._piston(lib, alpha)[0][1]
+    def driving_pin(self, lib: Any, alpha: Any) -> tuple[Any, Any, Any]:
+        """Return the motion of the rod's pin on the rocker."""
+        return self._on_rocker(self.links(lib, alpha)[0], self.end)
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
         """Return the motion of piston, coupler, rocker and piston rod, with derivatives by the crank angle alpha."""
         rocker, coupler = self.links(lib, alpha)
-        (place, velocity, acceleration), rod = self._piston(lib, alpha)
+        (place, velocity, acceleration), rod = self.piston(lib, alpha)
         piston = place + 1j * self.piston_offset, velocity, acceleration
         crank = (0.0 * alpha + self.crank_radius) * (lib.cos(alpha) + 1j * lib.sin(alpha))
         pin, end = self._on_rocker(rocker, complex(self.arm)), self._on_rocker(rocker, self.end)
@@ -160,19 +146,14 @@ class CrankRocker(SliderCrank):
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
         """Return the outlines of piston, coupler, both arms of the rocker, and piston rod."""
-        angle, half = np.float64(alpha), 0.04 * self.stroke
+        angle, width = np.float64(alpha), 0.08 * self.stroke
         rocker = complex(self.links(np, angle)[0][0])
         pin, end = self.pivot + self.arm * rocker, self.pivot + self.end * rocker
         piston = complex(self.motion(np, angle).points[0][1][0])
-        wide = 0.5 * (self.bore or self.stroke)
-        corners, sides = np.array([1, 1, -1, -1]), 1j * np.array([1, -1, -1, 1])
-        outlines = [Outline(piston + 0.25 * self.stroke * corners + wide * sides, 2.0 * wide, True)]
-        crank = self.crank_radius * np.exp(1j * angle)
-        for first, last in ((crank, pin), (self.pivot, pin), (self.pivot, end), (end, piston)):
-            along = 0.5 * (last - first)
-            bar = first + along * (1.0 + corners) + half * along / abs(along) * sides
-            outlines.append(Outline(bar, 2.0 * half, True))
-        return tuple(outlines)
+        wide, crank = self.bore or self.stroke, self.crank_radius * complex(np.exp(1j * angle))
+        head = bar(piston - 0.25 * self.stroke, piston + 0.25 * self.stroke, wide)
+        pairs = (crank, pin), (self.pivot, pin), (self.pivot, end), (end, piston)
+        return Outline(head, wide, True), *(Outline(bar(*ends, width), width, True) for ends in pairs)
 
 
 def _between(first: tuple[Any, Any, Any], last: tuple[Any, Any, Any], share: float) -> tuple[Any, Any, Any]:

@@ -89,13 +89,11 @@ def piston_motion(part: SliderCrank, speed: float) -> PistonMotion:
 def _unit_motion(part: SliderCrank) -> PistonMotion:
     alpha = part.dead_centres[0] + math.tau / STEPS * np.arange(STEPS)
     _, velocity, acceleration = (np.real(row) + 0.0 * alpha for row in part.motion(np, alpha).points[0][1])
-    rod = None
-    if part.has_rod and part.rod_ratio > 0.0:
-        sine, cosine = part.rod_lean(np, alpha)
-        rod = _largest(np.abs(np.arctan2(sine, cosine)))
+    sine, cosine = part.rod_lean(np, alpha)
+    rod_angle = _largest(np.abs(np.arctan2(sine, cosine)))
     return PistonMotion(
         part.stroke, part.stroke / math.pi, _largest(np.abs(velocity)), _largest(-acceleration),
-        _largest(acceleration), rod,
+        _largest(acceleration), rod_angle if part.has_rod and rod_angle.value > 0.0 else None,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from laufruhe.machine.bodies import Motion, Outline
+from laufruhe.machine.bodies import Motion, Outline, bar
 from laufruhe.machine.slider_crank import SliderCrank
 
 
@@ -45,17 +45,9 @@ class RhombicHalf(SliderCrank):
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
         """Return the outlines of both rods and of the yokes' halves."""
-        angle, half = np.float64(alpha), 0.04 * self.stroke
+        angle, width = np.float64(alpha), 0.08 * self.stroke
         pin = self.crank_radius * complex(np.exp(1j * angle))
         sine, cosine = (float(part) for part in self.rod_lean(np, angle))
-        corners, sides = np.array([1, 1, -1, -1]), 1j * np.array([1, -1, -1, 1])
-        outlines = []
-        for up in (1.0, -1.0):
-            yoke = pin + self.rod_length * complex(up * cosine, -sine)
-            along = 0.5 * (yoke - pin)
-            bar = pin + along * (1.0 + corners) + half * along / abs(along) * sides
-            outlines += [
-                Outline(bar, 2.0 * half, True),
-                Outline(yoke + half * corners + 4.0 * half * sides, 2.0 * half, True),
-            ]
-        return tuple(outlines)
+        yokes = [pin + self.rod_length * complex(side * cosine, -sine) for side in (1.0, -1.0)]
+        bars = [ends for yoke in yokes for ends in ((pin, yoke), (yoke - 2j * width, yoke + 2j * width))]
+        return tuple(Outline(bar(*ends, width), width, True) for ends in bars)

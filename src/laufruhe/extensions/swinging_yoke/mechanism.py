@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.bodies import Motion, Outline
+from laufruhe.machine.bodies import Motion, Outline, bar
 from laufruhe.machine.slider_crank import SliderCrank
 
 _THICKNESS = 0.15
@@ -137,15 +137,11 @@ class SwingingYoke(SliderCrank):
         wide, side = 0.06 * self.stroke, math.sqrt(self.lever_weight / _WEIGHT)
         behind = self.lever_weight_radius if self.lever_weight > 0.0 else wide
         bodies = [
-            Outline(ram + _box(0.4 * self.stroke, wide), 4.0 * wide, True),
-            Outline(pivot + direction * (0.5 * (self.lever_length - behind) + _box(0.5 * (self.lever_length + behind),
-                    0.5 * wide)), wide, True),
+            Outline(bar(ram - 0.4 * self.stroke, ram + 0.4 * self.stroke, 2.0 * wide), 4.0 * wide, True),
+            Outline(bar(pivot - behind * direction, pivot + self.lever_length * direction, wide), wide, True),
             Outline(pivot + wide * np.exp(1j * np.linspace(0.0, math.tau, 25)), wide, False),
-        ]  # fmt: skip
+        ]
         if self.lever_weight > 0.0:
-            bodies.append(Outline(pivot + direction * (_box(0.5 * side, 0.5 * side) - behind), _THICKNESS, True))
+            first, last = (pivot - (behind - half) * direction for half in (0.5 * side, -0.5 * side))
+            bodies.append(Outline(bar(first, last, side), _THICKNESS, True))
         return tuple(bodies)
-
-
-def _box(half_length: float, half_width: float) -> Any:
-    return np.array([1, 1, -1, -1]) * half_length + 1j * np.array([1, -1, -1, 1]) * half_width
