@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
 
 from laufruhe.errors import counted
-from laufruhe.machine import Chambers, Compressor, PressureTrace
+from laufruhe.machine import PressureTrace
 from laufruhe.machine.chambers import GasModel, models_of
-from laufruhe.physics.compressor_stages import Stage, links_of, matched_pressures
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
-from laufruhe.present.numbers import DEGREE, share, trimmed
+from laufruhe.present.numbers import DEGREE, trimmed
+from laufruhe.problem.advice import ADVICE
 from laufruhe.problem.problem import Problem
 from laufruhe.units import readable
 
-_EXCESS = 0.005
-"""Largest relative difference between delivery and intake of two stages that needs no sentence."""
 _LINES = 8
 """Largest number of operating points with a line of their own."""
 
@@ -35,7 +32,7 @@ def gas_rows(problem: Problem) -> list[tuple[str, ...]]:
 
 
 def gas_note(problem: Problem) -> list[str]:
-    """Return sentences on how the files of recorded traces were read, and on what compressors take in."""
+    """Return sentences on how the files of recorded traces were read, and those of extensions."""
     recorded = [sentence for _, facts in _facts(problem) for sentence in facts.recording]
     speeds = defaultdict[GasModel, set[float]](set)
     for point in problem.points:
@@ -47,47 +44,8 @@ def gas_note(problem: Problem) -> list[str]:
         for several in speeds.values()
         if len(several) > 1
     ]
-    gases = dict.fromkeys(problem.fidelity.gas_of(point) for point in problem.points)
-    compressors = (sentence for gas in gases for sentence in _compressors(problem, gas))
-    return list(dict.fromkeys([*recorded, *compressors]))
-
-
-def _compressors(problem: Problem, gas: GasModel | None) -> list[str]:
-    # what each stage takes in, and what one delivers more or less than the next takes in
-    models = (model for model in models_of(gas) if isinstance(model, Chambers))
-    chambers = [(chamber, chamber.diagram) for model in models for chamber in model.chambers]
-    stages = [
-        Stage(
-            chamber.name, chamber.swept_volume(problem.engine.slider_cranks), diagram.back_pressure, diagram.admission,
-            diagram.clearance, diagram.exponent,
-        )
-        for chamber, diagram in chambers
-        if isinstance(diagram, Compressor)
-    ]  # fmt: skip
-    sentences = [
-        f"{stage.name} takes in {share(stage.intake / stage.volume)} of the volume of its stroke, "
-        f"{trimmed(1e3 * stage.intake)} l a turn at {trimmed(1e-5 * stage.suction)} bar "
-        f"(pressure times volume: {trimmed(1e-2 * stage.amount)} bar l)."
-        for stage in stages
-    ]
-    links = links_of(stages)
-    uneven = [k for k, link in enumerate(links) if abs(link.excess) > _EXCESS]
-    matched = matched_pressures(stages) if uneven else None
-    for k in uneven:
-        link = links[k]
-        more = "more" if link.excess > 0.0 else "less"
-        remedy = "no pressure between the stages makes both equal" if matched is None else (
-            f"at {trimmed(1e-5 * matched[k])} bar both are equal" + " with the others matched too" * (len(links) > 1)
-        )  # fmt: skip
-        sentences.append(
-            f"{_names(link.before)} delivers {share(abs(link.excess))} {more} than {_names(link.after)} takes in at "
-            f"{trimmed(1e-5 * link.pressure)} bar, if the gas is cooled to the inlet temperature; {remedy}."
-        )
-    return sentences
-
-
-def _names(stages: Sequence[Stage]) -> str:
-    return " with ".join(stage.name for stage in stages)
+    further = (sentence for advice in ADVICE.values() for sentence in advice.about_gas(problem))
+    return list(dict.fromkeys([*recorded, *further]))
 
 
 def gas_lines(problem: Problem) -> list[str]:

@@ -34,7 +34,6 @@ _CAPTIONS = {
     "ellipses": "Mass ellipses: path of the free force and of the free couple of each order.",
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
-    "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
     "willans": "Fuel over brake load with the Willans line, or drag over speed; the fitted line gives the friction.",
     "torque": "Torque of gas, pistons and rods, its work and orders, and the crank speed with the flywheel.",
     "bearings": "Force on each main bearing over a cycle, on block and crankshaft, and its wear.",

@@ -23,6 +23,8 @@ class Advice:
         Subject of the advice.
     about_problem
         Function that returns warnings about a problem.
+    about_gas
+        Function that returns sentences about the gas of a problem.
     about_file
         Function of [engine] of a file and of its problem that returns warnings.
     remedied
@@ -31,6 +33,7 @@ class Advice:
 
     name: str
     about_problem: Callable[[Problem], Iterable[Complaint]] = lambda _: ()
+    about_gas: Callable[[Problem], Iterable[str]] = lambda _: ()
     about_file: Callable[[Any, Problem], Iterable[Complaint]] = lambda _, __: ()
     remedied: Callable[[Any, Complaint], Complaint] = lambda _, complaint: complaint
 

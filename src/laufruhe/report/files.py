@@ -27,7 +27,7 @@ KINDS = ("png", "svg")
 """Endings of picture files."""
 TABLES = (
     "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings", "torque",
-    "indicator", "uneven-firing", "willans", "bearings-on-crank", "wear", "mount-critical-speeds",
+    "uneven-firing", "willans", "bearings-on-crank", "wear", "mount-critical-speeds",
     "mounts", "mounting",
     "reach", "objectives-in-order", "equal-optima", "weights", "shafts", "balance-factors", "crankshaft-torque",
     "gas-pressure", "load-cases", "even-speeds",

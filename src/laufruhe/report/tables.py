@@ -18,8 +18,6 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.torque import excess_torque, swing_of, torque_parts, turning_inertia
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.present.curves import (
-    indicator_of,
-    points_with_chambers,
     transmissibility_of,
     transmissibility_speeds,
 )
@@ -127,7 +125,6 @@ def _degrees(angles: Iterable[float]) -> str:
 
 DIRECTIONS = 180
 """Number of directions of the wear table."""
-TURN = math.tau * np.arange(STEPS) / STEPS
 
 
 def _orders(result: Result) -> Table:
@@ -175,26 +172,6 @@ def _uneven_firing(result: Result) -> Table:
         [math.degrees(p.allowed), math.degrees(p.deviation), p.value, p.lower_bound] for p in ranking_of(result).trade
     ]
     return Table(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"lower bound [{unit}]"], rows)
-
-
-def _indicator(result: Result) -> Table:
-    parts, rows, chamber_names = result.final.engine.slider_cranks, [], dict[str, None]()
-    diagrams = [
-        (point.name, part.name, indicator_of(gas, part, point, TURN))
-        for point, gas in points_with_chambers(result)
-        for part in parts
-        if gas.of(part)
-    ]
-    for _, _, diagram in diagrams:
-        chamber_names |= dict.fromkeys(diagram.pressures)
-    for point, part, diagram in diagrams:
-        # a cylinder may lack a chamber
-        pressures = (diagram.pressures.get(name, np.full(STEPS, math.nan)) for name in chamber_names)
-        columns = np.column_stack([np.degrees(TURN), diagram.travel, diagram.force, diagram.needed, *pressures])
-        rows += [[point, part, *row] for row in columns.tolist()]
-    head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke", "force of the chambers [N]",
-            "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in chamber_names)]  # fmt: skip
-    return Table(head, rows)
 
 
 def _willans(result: Result) -> Table:
@@ -305,7 +282,6 @@ _TABLES: NumberTables = {
     "transmissibility": (is_elastic, _transmissibility),
     "rankings": (has_ranking, _rankings),
     "torque": (lambda result: uses_torque(result) and has_loads(result), _torque),
-    "indicator": (points_with_chambers, _indicator),
     "uneven-firing": (has_ranking, _uneven_firing),
     "willans": (lambda result: result.problem.friction, _willans),
     "bearings-on-crank": (has_bearings, _on_crank),

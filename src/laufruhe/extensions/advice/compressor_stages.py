@@ -6,10 +6,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from laufruhe.machine.chambers import suction_point
+from laufruhe.machine import Chambers, Compressor
+from laufruhe.machine.chambers import GasModel, models_of, suction_point
+from laufruhe.present.numbers import share, trimmed
+from laufruhe.problem.advice import Advice
+from laufruhe.problem.problem import Problem
 
 MAX_SWEEPS, CLOSE = 200, 1e-10
 """Largest number of sweeps over the pressures between stages, and relative change that ends them."""
+_EXCESS = 0.005
+"""Largest relative difference between delivery and intake of two stages that needs no sentence."""
 SAME = 1e-6
 """Relative difference below which two pressures are equal."""
 
@@ -106,3 +112,49 @@ def _matched(link: Link) -> float | None:
     if not lower < upper or difference(lower) <= 0.0 or difference(upper) >= 0.0:
         return None
     return float(brentq(difference, lower, upper, xtol=1e-9 * lower))
+
+
+def _sentences(problem: Problem) -> list[str]:
+    gases = dict.fromkeys(problem.fidelity.gas_of(point) for point in problem.points)
+    return [sentence for gas in gases for sentence in _of_gas(problem, gas)]
+
+
+def _of_gas(problem: Problem, gas: GasModel | None) -> list[str]:
+    """Return what each stage takes in, and what one delivers more or less than the next takes in."""
+    models = (model for model in models_of(gas) if isinstance(model, Chambers))
+    chambers = [(chamber, chamber.diagram) for model in models for chamber in model.chambers]
+    stages = [
+        Stage(
+            chamber.name, chamber.swept_volume(problem.engine.slider_cranks), diagram.back_pressure, diagram.admission,
+            diagram.clearance, diagram.exponent,
+        )
+        for chamber, diagram in chambers
+        if isinstance(diagram, Compressor)
+    ]  # fmt: skip
+    sentences = [
+        f"{stage.name} takes in {share(stage.intake / stage.volume)} of the volume of its stroke, "
+        f"{trimmed(1e3 * stage.intake)} l a turn at {trimmed(1e-5 * stage.suction)} bar "
+        f"(pressure times volume: {trimmed(1e-2 * stage.amount)} bar l)."
+        for stage in stages
+    ]
+    links = links_of(stages)
+    uneven = [k for k, link in enumerate(links) if abs(link.excess) > _EXCESS]
+    matched = matched_pressures(stages) if uneven else None
+    for k in uneven:
+        link = links[k]
+        more = "more" if link.excess > 0.0 else "less"
+        remedy = "no pressure between the stages makes both equal" if matched is None else (
+            f"at {trimmed(1e-5 * matched[k])} bar both are equal" + " with the others matched too" * (len(links) > 1)
+        )  # fmt: skip
+        sentences.append(
+            f"{_names(link.before)} delivers {share(abs(link.excess))} {more} than {_names(link.after)} takes in at "
+            f"{trimmed(1e-5 * link.pressure)} bar, if the gas is cooled to the inlet temperature; {remedy}."
+        )
+    return sentences
+
+
+def _names(stages: Sequence[Stage]) -> str:
+    return " with ".join(stage.name for stage in stages)
+
+
+ADVICE = Advice("compressor stages", about_gas=_sentences)

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from laufruhe.extensions.indicator_diagrams.diagram import indicator_of, points_with_chambers
 from laufruhe.machine import Chambers, OperatingPoint, SliderCrank
 from laufruhe.physics.cylinder_volume import dead_centres
 from laufruhe.plots.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, entry, finish_page, page, styled
 from laufruhe.plots.words import FAINT, INK
-from laufruhe.present.curves import indicator_of, points_with_chambers
 from laufruhe.solvers.result import Result
 
 STEPS, MAX_ROWS = 1440, 6

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.extensions.indicator_diagrams import picture as indicator
 from laufruhe.machine import Chambers, Steam
-from laufruhe.plots.results import cycle, engine, indicator
+from laufruhe.plots.results import cycle, engine
 from laufruhe.solvers import Result
 from one_cylinder import mean_pressure_of
 from picture_faults import drawn_texts, overlaps
