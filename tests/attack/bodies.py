@@ -130,11 +130,11 @@ def compare_with_shapely(seed: int, steps: int = 720) -> tuple[Shape, list[str]]
     theirs = by_shapely(part, case, body, seat, np.linspace(0.0, 4.0 * math.pi, steps, endpoint=False))
     wrong = []
     for clearance in clearances(case, [part], 4.0 * math.pi, body, seat):
-        least, sampled = clearance.minimum, theirs[clearance.part]
+        minimum, sampled = clearance.minimum, theirs[clearance.part]
         # no sampled angle is below the bound, and the angle of the least distance has this distance
-        there = by_shapely(part, case, body, seat, np.array([least.angle]))[clearance.part]
-        if least.bound > max(sampled, 0.0) + SAGGING or abs(there - max(least.distance, 0.0)) > SAGGING:
-            wrong.append(f"{seed} {clearance.part}: {least}, sampled {sampled:g} m, there {there:g} m")
+        there = by_shapely(part, case, body, seat, np.array([minimum.angle]))[clearance.part]
+        if minimum.bound > max(sampled, 0.0) + SAGGING or abs(there - max(minimum.distance, 0.0)) > SAGGING:
+            wrong.append(f"{seed} {clearance.part}: {minimum}, sampled {sampled:g} m, there {there:g} m")
     return shape, wrong
 
 
@@ -143,16 +143,17 @@ def main() -> None:
     parser.add_argument("--from", dest="first", type=int, default=0)
     parser.add_argument("--number", type=int, default=200, help="of engines")
     parser.add_argument("--steps", type=int, default=720, help="crank angles of a cycle that shapely samples")
-    told = parser.parse_args()
+    arguments = parser.parse_args()
     faults, worst = [], 0.0
-    for seed in range(told.first, told.first + told.number):
-        shape, wrong = compare_with_shapely(seed, told.steps)
+    for seed in range(arguments.first, arguments.first + arguments.number):
+        shape, wrong = compare_with_shapely(seed, arguments.steps)
         error = worst_of_points(shape.sized(fillet=0.0))
         worst = max(worst, error)
         faults += [*wrong, *([f"{seed} {shape}: moments differ by {error:.2g}"] if error > COARSE else [])]
     print(*faults, sep="\n", end="\n" if faults else "")
     print(
-        f"{told.number} engines, {len(faults)} differences; moments differ from sums over points by {worst:.1e} at most"
+        f"{arguments.number} engines, {len(faults)} differences; "
+        f"moments differ from sums over points by {worst:.1e} at most"
     )
     sys.exit(bool(faults))
 

@@ -30,7 +30,7 @@ KINKED = 1e-4
 """The same where gas acts: its kinks lie between the samples of the plain model."""
 STEEP = 2.0
 """Times as much of a rotor, whose gas is most of what its bearings feel."""
-KEPT = 3e-5
+EXCESS = 3e-5
 """Share of a limit by which a design may pass it."""
 GAP = 1e-4
 SPARE = 2e-5
@@ -99,18 +99,18 @@ def tried(verdict: Verdict, work: Callable[[], list[str]]) -> Verdict:
     started = time.perf_counter()
     try:
         with silence_heard(verdict.wrong):
-            found = work()
-        verdict.wrong += [line for line in found if not line.startswith("note: ")]
-        verdict.notes += [line for line in found if line.startswith("note: ")]
+            answer = work()
+        verdict.wrong += [line for line in answer if not line.startswith("note: ")]
+        verdict.notes += [line for line in answer if line.startswith("note: ")]
         verdict.status = "done"
     except Exception as error:
         verdict.status = "error"
-        verdict.wrong.append(told_of(error))
+        verdict.wrong.append(message_of(error))
     verdict.seconds = time.perf_counter() - started
     return verdict
 
 
-def told_of(error: Exception) -> str:
+def message_of(error: Exception) -> str:
     """An error with the line that raised it."""
     last = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {str(error)[:200]}"
@@ -134,7 +134,7 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
             verdict.status = "refused"
             verdict.notes.append(f"note: {str(error)[:150]}")
             return verdict
-        verdict.wrong.append(told_of(error))
+        verdict.wrong.append(message_of(error))
         return verdict
     finally:
         (folder / f"{family}-{seed}-{os.getpid()}.toml").unlink(missing_ok=True)
@@ -176,34 +176,34 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
         return
     certificate = result.certificate
     verdict.kind, verdict.gap = certificate.kind.value, certificate.gap
-    vector, told = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
-    scene = openings.scene(vector, told)
+    vector, star = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
+    scene = openings.scene(vector, star)
     value, initial = result.objective.value, result.objective.initial
     floor = 1e-9 * max(initial if np.isfinite(initial) else 0.0, _size(table))
     reading = KINKED if "gas" in table else SAMPLED
     reading *= STEEP if "gas" in table and table["engine"]["layout"] == "rotary" else 1.0
     _judge_value(verdict, result, scene, value, reading, floor)
-    rival = _rival(openings, vector, told, value, rng, maximum)
+    rival = _rival(openings, vector, star, value, rng, maximum)
     verdict.rivals = rival.looked_at if rival else 0
     bound, reading = certificate.lower_bound, reading + result.error_estimate
     if bound > scene.objective * (1.0 + reading) + floor and scene.worst <= 0.0:
         verdict.wrong.append(f"own design {scene.objective:.9g} lies under its bound {bound:.9g}")
-    if scene.worst > KEPT:
+    if scene.worst > EXCESS:
         verdict.wrong.append(f"a limit is passed by {scene.worst:.2e} of itself")
-    given = openings.scene(*openings.read(result.initial.engine, {d.name: d.initial for d in result.decisions}))
-    if given.worst <= 0.0 and value > given.objective * (1.0 + reading) + floor:
-        verdict.wrong.append(f"value {value:.9g} is worse than {given.objective:.9g} as given")
+    initial_scene = openings.scene(*openings.read(result.initial.engine, {d.name: d.initial for d in result.decisions}))
+    if initial_scene.worst <= 0.0 and value > initial_scene.objective * (1.0 + reading) + floor:
+        verdict.wrong.append(f"value {value:.9g} is worse than {initial_scene.objective:.9g} as given")
     if rival is None or rival.violation > 1e-6:
         return
     # what a rival passes a limit by is worth the limit's price
     prices = (abs(float(np.nan_to_num(limit.shadow_price)) * limit.limit) for limit in result.limits)
     passed = (max(rival.violation, 0.0) + _read_low(result, scene)) * sum(prices)
     if bound > rival.value * (1.0 + reading) + floor + passed:
-        verdict.wrong.append(f"bound {bound:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
+        verdict.wrong.append(f"bound {bound:.9g}, a rival has {rival.value:.9g} {rival.star or ''}")
     over = (value - rival.value) / max(rival.value, floor)
     allowed = (GAP + reading) * max(rival.value, floor) + floor + passed
     if verdict.kind == "global" and value - rival.value > allowed:
-        verdict.wrong.append(f"global {value:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
+        verdict.wrong.append(f"global {value:.9g}, a rival has {rival.value:.9g} {rival.star or ''}")
     elif verdict.kind != "global":
         verdict.beaten = max(over, 0.0)
         if verdict.gap and rival.value < value * (1.0 - verdict.gap) * (1.0 - reading) - floor:
@@ -220,14 +220,16 @@ def _size(table: Table) -> float:
 
 def _limits_read(result: Any, scene: Any) -> Iterator[tuple[Table, Any, float]]:
     """Limits, and what the plain model says of the final design."""
-    for told, limit in zip(scene.table.get("constraints", []), result.limits, strict=False):
-        if told["limit"] != "natural frequencies" and told.get("name") == limit.name:
-            yield told, limit, scene.measure({**told, "quantity": told["limit"]})
+    for entry, limit in zip(scene.table.get("constraints", []), result.limits, strict=False):
+        if entry["limit"] != "natural frequencies" and entry.get("name") == limit.name:
+            yield entry, limit, scene.measure({**entry, "quantity": entry["limit"]})
 
 
 def _read_low(result: Any, scene: Any) -> float:
     """Share of its limit by which the plain model misses a peak of the final design, as it misses those of rivals."""
-    shares = ((limit.value - own) / limit.limit for told, limit, own in _limits_read(result, scene) if "max" in told)
+    shares = (
+        (limit.value - value) / limit.limit for entry, limit, value in _limits_read(result, scene) if "max" in entry
+    )
     return min(max([0.0, *shares]), KINKED) if "gas" in scene.table else 0.0
 
 
@@ -239,29 +241,29 @@ def _judge_value(verdict: Verdict, result: Any, scene: Any, value: float, readin
             f"value {value:.9g} is {scene.objective:.9g}, {away / max(value, floor):.2e} off, "
             f"error estimate {result.error_estimate:.1e}"
         )
-    for told, limit, own in _limits_read(result, scene):
+    for entry, limit, recomputed in _limits_read(result, scene):
         allowed = (10 * reading + 1.5 * limit.error_estimate) * max(
-            own, 1e-6 * number(told.get("max", told.get("min")))
+            recomputed, 1e-6 * number(entry.get("max", entry.get("min")))
         )
-        if abs(own - limit.value) > allowed:
+        if abs(recomputed - limit.value) > allowed:
             verdict.wrong.append(
-                f"limit {limit.name} is said to be {limit.value:.9g} and is {own:.9g}, "
+                f"limit {limit.name} is said to be {limit.value:.9g} and is {recomputed:.9g}, "
                 f"error estimate {limit.error_estimate:.1e}"
             )
 
 
 def _rival(
-    openings: Openings, vector: np.ndarray, told: Table, value: float, rng: np.random.Generator, maximum: int
+    openings: Openings, vector: np.ndarray, star: Table, value: float, rng: np.random.Generator, maximum: int
 ) -> Rival | None:
-    enough = value * (1.0 - 0.2 * GAP)
+    target = value * (1.0 - 0.2 * GAP)
     optional = any(shaft.get("optional") for shaft in openings.table.get("balancer_shafts", []))
     if optional or (openings.numbers and openings.table["engine"].get("throws") == "open"):
-        return best_of_choices(openings.table, rng, (vector, told), 100 * maximum, enough)
+        return best_of_choices(openings.table, rng, (vector, star), 100 * maximum, target)
     if openings.numbers:
-        return local_rival(openings, rng, [vector], 100 * maximum, told)
+        return local_rival(openings, rng, [vector], 100 * maximum, star)
     if openings.table["engine"].get("throws") == "open":
-        return best_star(openings, 10 * maximum, enough)
-    return convex_rival(openings, vector, told, enough)
+        return best_star(openings, 10 * maximum, target)
+    return convex_rival(openings, vector, star, target)
 
 
 def _judge_infeasible(verdict: Verdict, openings: Openings, rng: np.random.Generator, maximum: int) -> None:
@@ -273,6 +275,6 @@ def _judge_infeasible(verdict: Verdict, openings: Openings, rng: np.random.Gener
     if rival is None:
         return
     verdict.rivals = rival.looked_at
-    spare = -openings.scene(rival.vector, rival.told).worst
+    spare = -openings.scene(rival.vector, rival.star).worst
     if spare > SPARE:
         verdict.wrong.append(f"{verdict.status}, but a rival keeps every limit with {spare:.2e} to spare")

@@ -35,22 +35,22 @@ from attack.families import (
     with_objective,
 )
 from attack.openings import Openings
-from attack.own_families import asked_load, objective, open_numbers, scene
-from attack.own_problem import Own
+from attack.own_families import objective, open_numbers, random_load, scene
+from attack.own_problem import OwnModel
 from attack.plain_loads import number
 from attack.plain_scene import Scene, Table
-from attack.rivals import KEPT, Rival, convex_rival, designs_told, local_rival
+from attack.rivals import EXCESS, Rival, convex_rival, local_rival, stars_of
 
 WIDE = {"between": ["-0.2 m", "0.2 m"]}
 
 
 def weights(rng: Generator, table: Table, count: int) -> list[Table]:
     """Counterweights of any angle that may be nothing."""
-    found = counterweights(rng, moving_mass(table["engine"]), count)
-    for told in found:
-        told["angle"] = {"between": [0, 360]}
-        told["mass"]["between"][0] = "0.0 kg"
-    return found
+    rows = counterweights(rng, moving_mass(table["engine"]), count)
+    for entry in rows:
+        entry["angle"] = {"between": [0, 360]}
+        entry["mass"]["between"][0] = "0.0 kg"
+    return rows
 
 
 def star_engine(rng: Generator) -> Table:
@@ -71,16 +71,17 @@ def on_mounts(rng: Generator, table: Table) -> Table:
 # --- judged by the own model of elastic mounts
 
 
-def at_a_share(rng: Generator, table: Table, told: Table) -> Table:
+def at_a_share(rng: Generator, table: Table, entry: Table) -> Table:
     """A limit on a measure, a little over what a random design has, or under what most have."""
-    own = Own(table, 256, 1e-9)
-    low, high = own.box.T
-    has = own.designs(low + (high - low) * rng.random((20, len(low)))).measure(told)
+    model = OwnModel(table, 256, 1e-9)
+    low, high = model.box.T
+    has = model.designs(low + (high - low) * rng.random((20, len(low)))).measure(entry)
     maximum = has[0] * rng.uniform(1.0, 1.1) if rng.random() < 0.6 else np.quantile(has, rng.uniform(0.05, 0.4))
-    unit = {"transmissibility": "", "static sag": "m", "motion frequencies": "Hz"}[told["quantity"]]
-    rest = {key: value for key, value in told.items() if key != "quantity"}
+    unit = {"transmissibility": "", "static sag": "m", "motion frequencies": "Hz"}[entry["quantity"]]
+    rest = {key: value for key, value in entry.items() if key != "quantity"}
     return {
-        "limit": told["quantity"], "max": q(float(maximum), unit, 9) if unit else float(f"{maximum:.9g}"), "name": "l0",
+        "limit": entry["quantity"],
+        "max": q(float(maximum), unit, 9) if unit else float(f"{maximum:.9g}"), "name": "l0",
         **rest,
     }  # fmt: skip
 
@@ -88,16 +89,16 @@ def at_a_share(rng: Generator, table: Table, told: Table) -> Table:
 def transmissibility_and_weights(rng: Generator) -> Table:
     table = scene(rng, 2, True)
     table["counterweights"] = weights(rng, table, int(rng.integers(1, 3)))
-    table["objective"] = objective(asked_load(rng, table))
-    told = {"quantity": "transmissibility", **({"orders": [1]} if rng.random() < 0.5 else {})}
-    return {**table, "constraints": [at_a_share(rng, table, told)]}
+    table["objective"] = objective(random_load(rng, table))
+    entry = {"quantity": "transmissibility", **({"orders": [1]} if rng.random() < 0.5 else {})}
+    return {**table, "constraints": [at_a_share(rng, table, entry)]}
 
 
 def damper_and_weights(rng: Generator) -> Table:
     table = scene(rng, 2, True)
     open_numbers(rng, table, ["damping"])
     table["counterweights"] = weights(rng, table, 1)
-    return {**table, "objective": objective(asked_load(rng, table)), "search": {"boxes": 20, "starts": 5}}
+    return {**table, "objective": objective(random_load(rng, table)), "search": {"boxes": 20, "starts": 5}}
 
 
 def sag_and_weights(rng: Generator) -> Table:
@@ -105,7 +106,7 @@ def sag_and_weights(rng: Generator) -> Table:
     table = scene(rng, 2, True)
     open_numbers(rng, table, ["stiffness"] * int(rng.integers(1, 3)))
     table["counterweights"] = weights(rng, table, 1)
-    table["objective"] = objective(asked_load(rng, table))
+    table["objective"] = objective(random_load(rng, table))
     limit = at_a_share(rng, table, {"quantity": "static sag"})
     return {**table, "constraints": [limit], "search": {"boxes": 20, "starts": 5}}
 
@@ -130,11 +131,11 @@ def stars_on_mounts(rng: Generator) -> Table:
 
 
 def between_bounds(rng: Generator, count: int) -> list[Any]:
-    told: list[Any] = [0.0, *(round(360.0 * k / count + rng.uniform(-15.0, 15.0), 3) for k in range(1, count))]
+    angles: list[Any] = [0.0, *(round(360.0 * k / count + rng.uniform(-15.0, 15.0), 3) for k in range(1, count))]
     for k in rng.choice(count - 1, int(rng.integers(1, 3)), replace=False) + 1:
         wide = rng.uniform(5.0, 40.0)
-        told[k] = {"between": [round(told[k] - wide, 3), round(told[k] + wide, 3)]}
-    return told
+        angles[k] = {"between": [round(angles[k] - wide, 3), round(angles[k] + wide, 3)]}
+    return angles
 
 
 def uneven_and_stiffness(rng: Generator) -> Table:
@@ -176,13 +177,13 @@ def leads_and_places(rng: Generator) -> Table:
 def pistons_and_stars(rng: Generator) -> Table:
     """The reciprocating mass is open beside a star, with weights that are given or open."""
     engine = star_engine(rng)
-    given = number(engine["reciprocating_mass"])
+    mass = number(engine["reciprocating_mass"])
     table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
     table["counterweights"] = weights(rng, table, 1)
     if rng.random() < 0.6:
         table["counterweights"][0] |= {"mass": table["counterweights"][0]["mass"]["between"][1], "angle": angle(rng)}
     engine["reciprocating_mass"] = {
-        "between": [q(0.6 * given, "kg"), q(1.6 * given, "kg")], "start": q(given, "kg")
+        "between": [q(0.6 * mass, "kg"), q(1.6 * mass, "kg")], "start": q(mass, "kg")
     }  # fmt: skip
     return with_objective(rng, table, 1)
 
@@ -224,8 +225,8 @@ def robust_and_star(rng: Generator) -> Table:
     engine = star_engine(rng)
     table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
     table["counterweights"] = weights(rng, table, int(rng.integers(1, 3)))
-    for told in table["counterweights"]:
-        told["mass"]["tolerance"] = f"± {100.0 * SPREAD:g} %"
+    for entry in table["counterweights"]:
+        entry["mass"]["tolerance"] = f"± {100.0 * SPREAD:g} %"
     return {**with_objective(rng, table, 1), "robust": {"over": "worst case"}}
 
 
@@ -258,41 +259,41 @@ def choices(table: Table) -> Iterator[Table]:
     optional = [k for k, shaft in enumerate(shafts) if shaft.get("optional")]
     maximum = min(table.get("phasing", {}).get("most_shafts", len(optional)), len(optional))
     for built in itertools.combinations(optional, maximum):
-        kept = [shaft for k, shaft in enumerate(shafts) if k not in optional or k in built]
-        yield {**table, "balancer_shafts": kept}
+        built_shafts = [shaft for k, shaft in enumerate(shafts) if k not in optional or k in built]
+        yield {**table, "balancer_shafts": built_shafts}
 
 
 def best_of_choices(
-    table: Table, rng: Generator, known: tuple[np.ndarray, Table], calls: int, enough: float
+    table: Table, rng: Generator, known: tuple[np.ndarray, Table], calls: int, target: float
 ) -> Rival | None:
     """The best design of every star and every choice of shafts, each by a search of its own; None if they are many."""
-    every = [(Openings(one), told) for one in choices(table) for told in designs_told(Openings(one))]
+    every = [(Openings(one), star) for one in choices(table) for star in stars_of(Openings(one))]
     if not every or len(every) > calls // 60:
         return None
-    found = []
-    for openings, told in every:
+    rivals = []
+    for openings, star in every:
         start = openings.nearest(np.zeros(openings.size))
         if openings.numbers:
-            alike = np.allclose(told.get("throws", 0.0), known[1].get("throws", 0.0), atol=1e-6)
+            alike = np.allclose(star.get("throws", 0.0), known[1].get("throws", 0.0), atol=1e-6)
             near = [known[0]] if len(known[0]) == openings.size and alike else []
-            found.append(local_rival(openings, rng, [start, *near], calls // len(every) + 60, told))
+            rivals.append(local_rival(openings, rng, [start, *near], calls // len(every) + 60, star))
         else:
-            found.append(convex_rival(openings, start, told, enough))
-    kept = [rival for rival in found if rival.violation <= KEPT]
-    return min(kept, key=lambda rival: rival.value) if kept else min(found, key=lambda rival: rival.violation)
+            rivals.append(convex_rival(openings, start, star, target))
+    feasible = [rival for rival in rivals if rival.violation <= EXCESS]
+    return min(feasible, key=lambda rival: rival.value) if feasible else min(rivals, key=lambda rival: rival.violation)
 
 
 # --- judges of their own
 
 
-def worst(openings: Openings, vector: np.ndarray, told: Table) -> float:
+def worst(openings: Openings, vector: np.ndarray, star: Table) -> float:
     """The most that an engine has whose weights are as much too heavy or too light as they may be."""
-    scene = openings.scene(openings.nearest(vector.copy()), told)
-    own = [k for k, rotor in enumerate(scene.rotors) if rotor[6] == "c"]
+    scene = openings.scene(openings.nearest(vector.copy()), star)
+    counterweights = [k for k, rotor in enumerate(scene.rotors) if rotor[6] == "c"]
     values = []
-    for signs in itertools.product((-1.0, 1.0), repeat=len(own)):
+    for signs in itertools.product((-1.0, 1.0), repeat=len(counterweights)):
         rotors = list(scene.rotors)
-        for k, sign in zip(own, signs, strict=True):
+        for k, sign in zip(counterweights, signs, strict=True):
             rotors[k] = (*rotors[k][:4], rotors[k][4] * (1.0 + SPREAD * sign), *rotors[k][5:])
         values.append(Scene(scene.table, rotors, scene.order).objective)
     return max(values)
@@ -302,19 +303,19 @@ def judge_robust(verdict: Any, table: Table, result: Any, maximum: int) -> None:
     openings = Openings(table)
     vector, star = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
     value, bound = result.objective.value, result.certificate.lower_bound
-    own = worst(openings, vector, star)
+    recomputed = worst(openings, vector, star)
     reading, floor = 2e-5 + result.error_estimate, 1e-9 * result.objective.initial
-    if abs(own - value) > 1.5 * reading * value + floor:
-        verdict.wrong.append(f"worst case {value:.9g} is {own:.9g}")
-    best = own
-    for told in designs_told(openings):
+    if abs(recomputed - value) > 1.5 * reading * value + floor:
+        verdict.wrong.append(f"worst case {value:.9g} is {recomputed:.9g}")
+    best = recomputed
+    for choice in stars_of(openings):
         for start in (openings.nearest(np.zeros(openings.size)), vector):
-            found = minimize(
-                lambda x, told=told: worst(openings, x, told), start, method="Nelder-Mead",
+            optimum = minimize(
+                lambda x, choice=choice: worst(openings, x, choice), start, method="Nelder-Mead",
                 options={"maxfev": 20 * maximum},
             )  # fmt: skip
-            best = min(best, float(found.fun))
-            verdict.rivals += int(found.nfev)
+            best = min(best, float(optimum.fun))
+            verdict.rivals += int(optimum.nfev)
     if bound > best * (1.0 + reading) + floor:
         verdict.wrong.append(f"bound {bound:.9g}, a rival has {best:.9g}")
     if verdict.kind == "global" and value > best * (1.0 + 1e-4 + reading) + floor:
@@ -327,17 +328,17 @@ def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
     openings = Openings({**table, "objective": table["objective"][0]})
     vector, _ = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
     reading = 3e-5 + result.error_estimate
-    for told, rank in zip(table["objective"], result.ranks, strict=True):
-        stage = Openings({**copy.deepcopy(table), "objective": told, "constraints": list(limits)})
-        own = stage.scene(vector, {})
+    for entry, rank in zip(table["objective"], result.ranks, strict=True):
+        stage = Openings({**copy.deepcopy(table), "objective": entry, "constraints": list(limits)})
+        scene = stage.scene(vector, {})
         floor = 1e-9 * max(rank.initial, rank.final)
-        if abs(own.objective - rank.final) > reading * max(rank.final, own.objective) + floor:
-            verdict.wrong.append(f"{rank.name} is said to be {rank.final:.9g} and is {own.objective:.9g}")
-        if own.worst > 3e-5:
-            verdict.wrong.append(f"a limit is passed by {own.worst:.2e} of itself")
+        if abs(scene.objective - rank.final) > reading * max(rank.final, scene.objective) + floor:
+            verdict.wrong.append(f"{rank.name} is said to be {rank.final:.9g} and is {scene.objective:.9g}")
+        if scene.worst > 3e-5:
+            verdict.wrong.append(f"a limit is passed by {scene.worst:.2e} of itself")
         rival = convex_rival(stage, vector, {}, rank.minimum * (1.0 - 2e-5), STEEP_CHARGE)
         verdict.rivals += rival.looked_at
-        if rival.violation <= KEPT:
+        if rival.violation <= EXCESS:
             # what a rival passes a limit by is charged: near the best of a rank before, any share is worth much
             best = rival.value * (1.0 + STEEP_CHARGE * max(rival.violation, 0.0))
             if rank.lower_bound > best * (1.0 + reading) + floor:
@@ -345,6 +346,6 @@ def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
             if str(rank.proof) == "global" and rank.minimum > best * (1.0 + 1e-4 + reading) + floor:
                 verdict.wrong.append(f"{rank.name}: global {rank.minimum:.9g}, a rival has {best:.9g}")
         if rank.limit is not None:
-            quantity = told["minimise"]
-            rest = {key: value for key, value in told.items() if key != "minimise"}
+            quantity = entry["minimise"]
+            rest = {key: value for key, value in entry.items() if key != "minimise"}
             limits.append({"limit": quantity, "max": q(rank.limit, unit_of(quantity), 15), "name": "rank", **rest})

@@ -27,15 +27,15 @@ LEVEL = 0.4
 class Load:
     """A norm of rows that are affine in the vector."""
 
-    def __init__(self, openings: Openings, asked: Table, told: Table | None, order: tuple[int, ...] | None) -> None:
-        self.norm, _ = norm_and_channel(asked["quantity"])
+    def __init__(self, openings: Openings, term: Table, star: Table | None, order: tuple[int, ...] | None) -> None:
+        self.norm, _ = norm_and_channel(term["quantity"])
         step = STEPS[self.norm]
         zero = np.zeros(openings.size)
-        first = openings.scene(zero, told, order)
-        self.at_zero = first.signal(asked)[:, :, ::step]
-        rows = [openings.scene(unit, told, order).signal(asked)[:, :, ::step] for unit in np.eye(openings.size)]
+        first = openings.scene(zero, star, order)
+        self.at_zero = first.signal(term)[:, :, ::step]
+        rows = [openings.scene(unit, star, order).signal(term)[:, :, ::step] for unit in np.eye(openings.size)]
         self.slopes = np.stack([r - self.at_zero for r in rows], axis=-1) if rows else self.at_zero[..., None][..., :0]
-        weights = first.weights(asked)
+        weights = first.weights(term)
         self.share = weights / weights.sum()
 
     def planes(self, x: np.ndarray) -> list[Plane]:
@@ -55,33 +55,36 @@ class Load:
         if self.norm == "worst mean":
             ways = np.einsum("kjnd,kjndq->kq", along, self.slopes) / (length.shape[1] * length.shape[2])
             return [(float(length[k].mean()), ways[k]) for k in np.flatnonzero(self.share)]
-        each = self.share[:, None, None] / (length.shape[1] * length.shape[2])
+        weights = self.share[:, None, None] / (length.shape[1] * length.shape[2])
         if self.norm == "mean":
             return [
-                (float((each * length).sum()), np.einsum("kjn,kjnd,kjndq->q", each + 0 * length, along, self.slopes))
+                (
+                    float((weights * length).sum()),
+                    np.einsum("kjn,kjnd,kjndq->q", weights + 0 * length, along, self.slopes),
+                )
             ]
         if self.norm == "rmq":
-            value = float((each * length**4).sum()) ** 0.25
-            slope = np.einsum("kjn,kjnd,kjndq->q", each * length**2, rows, self.slopes)
+            value = float((weights * length**4).sum()) ** 0.25
+            slope = np.einsum("kjn,kjnd,kjndq->q", weights * length**2, rows, self.slopes)
             return [(value, slope / (value**3 or 1.0))]
-        value = math.sqrt(float((each * length**2).sum()))
-        slope = np.einsum("kjn,kjnd,kjndq->q", each + 0 * length, rows, self.slopes)
+        value = math.sqrt(float((weights * length**2).sum()))
+        slope = np.einsum("kjn,kjnd,kjndq->q", weights + 0 * length, rows, self.slopes)
         return [(value, slope / (value or 1.0))]
 
     def _balls(self, rows: np.ndarray, slopes: np.ndarray) -> list[Plane]:
-        found = []
+        planes = []
         for v, s in zip(rows, slopes, strict=True):
-            value, held, pull = smallest_ball(v)
-            found.append((value, np.einsum("nd,ndq->q", pull, s[held])))
-        return found
+            value, active, pull = smallest_ball(v)
+            planes.append((value, np.einsum("nd,ndq->q", pull, s[active])))
+        return planes
 
 
 class Mass:
     """Sum of the masses of some weights."""
 
-    def __init__(self, openings: Openings, asked: Table) -> None:
+    def __init__(self, openings: Openings, term: Table) -> None:
         self.openings = openings
-        self.roles = {"counterweight mass": "c", "balancer mass": "b", "added mass": "cb"}[asked["quantity"]]
+        self.roles = {"counterweight mass": "c", "balancer mass": "b", "added mass": "cb"}[term["quantity"]]
 
     def planes(self, x: np.ndarray) -> list[Plane]:
         value, slope, at = 0.0, np.zeros(len(x)), 0
@@ -112,17 +115,17 @@ class Constant:
         return [(self.value, np.zeros(self.size))]
 
 
-def function_of(openings: Openings, asked: Table, told: Table | None, order: tuple[int, ...] | None) -> Any:
-    norm, channel = norm_and_channel(asked["quantity"])
+def function_of(openings: Openings, term: Table, star: Table | None, order: tuple[int, ...] | None) -> Any:
+    norm, channel = norm_and_channel(term["quantity"])
     if norm:
-        return Load(openings, asked, told, order)
+        return Load(openings, term, star, order)
     if channel.endswith("mass"):
-        return Mass(openings, asked)
-    return Constant(openings.scene(np.zeros(openings.size), told, order).measure(asked), openings.size)
+        return Mass(openings, term)
+    return Constant(openings.scene(np.zeros(openings.size), star, order).measure(term), openings.size)
 
 
 @dataclass(frozen=True)
-class Found:
+class Optimum:
     """Best vector, its objective at the planes' samples, largest excess of a limit, bound, prices of the limits."""
 
     vector: np.ndarray
@@ -138,13 +141,13 @@ class Program:
     The excess of limits is charged with `charge` times the unit, which no price may exceed.
     """
 
-    def __init__(self, openings: Openings, told: Table | None = None, order: tuple[int, ...] | None = None) -> None:
+    def __init__(self, openings: Openings, star: Table | None = None, order: tuple[int, ...] | None = None) -> None:
         self.openings = openings
         terms, limits = terms_of(openings.table), openings.table.get("constraints", [])
         self.factors = [t.get("weight", 1.0) for t in terms]
-        self.terms = [function_of(openings, t, told, order) for t in terms]
+        self.terms = [function_of(openings, t, star, order) for t in terms]
         self.maximum = [number(c["max"]) for c in limits]
-        self.limits = [function_of(openings, {**c, "quantity": c["limit"]}, told, order) for c in limits]
+        self.limits = [function_of(openings, {**c, "quantity": c["limit"]}, star, order) for c in limits]
 
     def minimum(
         self,
@@ -152,8 +155,8 @@ class Program:
         accuracy: float = 2e-6,
         maximum: int = 250,
         charge: float = 1e3,
-        enough: float = math.inf,
-    ) -> Found:
+        target: float = math.inf,
+    ) -> Optimum:
         """Least objective; what cannot be kept is broken as little as the charge makes it.
 
         Parameters
@@ -162,9 +165,9 @@ class Program:
             The search ends when no design under this value can be left.
         """
         value = sum(f * max(p[0] for p in t.planes(start)) for f, t in zip(self.factors, self.terms, strict=True))
-        return _Search(self, value or 1.0, charge).run(start, accuracy, maximum, enough / (value or 1.0))
+        return _Search(self, value or 1.0, charge).run(start, accuracy, maximum, target / (value or 1.0))
 
-    def minimum_violation(self, start: np.ndarray, accuracy: float = 1e-6, maximum: int = 250) -> Found:
+    def minimum_violation(self, start: np.ndarray, accuracy: float = 1e-6, maximum: int = 250) -> Optimum:
         """Least largest excess of the limits, as shares of them; its bound above zero proves that no design exists."""
         return _Search(self, 1.0, 1.0, only_limits=True).run(start, accuracy, maximum, 1e-6)
 
@@ -249,7 +252,7 @@ class _Search:
         bounds += [(-1.0 if self.only_limits else 0.0, None), (0.0, None)]
         return linprog(cost, A_ub=rows, b_ub=rights, bounds=bounds, method="highs")
 
-    def run(self, start: np.ndarray, accuracy: float, maximum: int, enough: float) -> Found:
+    def run(self, start: np.ndarray, accuracy: float, maximum: int, target: float) -> Optimum:
         x = best = self.p.openings.nearest(start.copy())
         charged, value, violation = self.look(x)
         bound, prices = -math.inf, tuple(0.0 for _ in self.p.limits)
@@ -258,7 +261,7 @@ class _Search:
             if under.status == 0:
                 bound = max(bound, float(under.fun))
                 prices = self._prices(under)
-            if charged - bound <= accuracy * max(abs(charged), 1e-3) or bound > enough:
+            if charged - bound <= accuracy * max(abs(charged), 1e-3) or bound > target:
                 break
             self._forget(under)
             ahead = self._nearest_below(best, bound + LEVEL * (charged - bound))
@@ -269,7 +272,7 @@ class _Search:
             if now[0] < charged:
                 best, (charged, value, violation) = x, now
         scale = 1.0 if self.only_limits else self.unit
-        return Found(best, value, violation, bound * scale, prices)
+        return Optimum(best, value, violation, bound * scale, prices)
 
     def _forget(self, solved: Any) -> None:
         """Leave out planes that lay far under the others, where there are many."""
@@ -278,7 +281,7 @@ class _Search:
         slack = solved.ineqlin.residual
         keep = [k for k, s in enumerate(slack) if s <= np.median(slack) or k >= len(slack) - 60]
         self.rows, self.rights, self.of_limit = (
-            [held[k] for k in keep] for held in (self.rows, self.rights, self.of_limit)
+            [rows[k] for k in keep] for rows in (self.rows, self.rights, self.of_limit)
         )
 
     def _nearest_below(self, centre: np.ndarray, level: float) -> np.ndarray | None:
@@ -292,12 +295,12 @@ class _Search:
                 extra.append((row, sign * float(c)))
         radius = np.zeros(self.columns)
         radius[-1] = 1.0
-        found = self._solve(radius, extra)
-        return found.x[: self.q] if found.status == 0 else None
+        point = self._solve(radius, extra)
+        return point.x[: self.q] if point.status == 0 else None
 
     def _prices(self, solved: Any) -> tuple[float, ...]:
         """Fall of the objective per unit of each limit."""
-        found, of = -solved.ineqlin.marginals, np.array(self.of_limit)
+        prices, of = -solved.ineqlin.marginals, np.array(self.of_limit)
         return tuple(
-            float(found[: len(of)][of == j].sum()) * self.unit / maximum for j, maximum in enumerate(self.p.maximum)
+            float(prices[: len(of)][of == j].sum()) * self.unit / maximum for j, maximum in enumerate(self.p.maximum)
         )

@@ -72,7 +72,7 @@ def _inline_toml(value: Any) -> str:
 def mechanism(rng: Generator, plain: bool = False) -> Table:
     """Sizes that every layout has."""
     radius = rng.uniform(0.03, 0.08)
-    found = {
+    engine = {
         "cycle": str(rng.choice(["two-stroke", "four-stroke"])),
         "stroke": q(2.0 * radius, "m"),
         "rod_length": q(radius / rng.uniform(0.2, 0.32), "m"),
@@ -80,10 +80,10 @@ def mechanism(rng: Generator, plain: bool = False) -> Table:
         "rotating_mass": q(rng.uniform(0.0, 1.0), "kg"),
     }
     if not plain and rng.random() < 0.5:
-        found["rod_inertia_deficit"] = q(rng.uniform(-0.004, 0.004), "kg m^2")
+        engine["rod_inertia_deficit"] = q(rng.uniform(-0.004, 0.004), "kg m^2")
     if not plain and rng.random() < 0.3:
-        found["offset"] = q(rng.uniform(-0.15, 0.15) * radius, "m")
-    return found
+        engine["offset"] = q(rng.uniform(-0.15, 0.15) * radius, "m")
+    return engine
 
 
 def angle(rng: Generator) -> float:
@@ -104,60 +104,62 @@ def inline(rng: Generator) -> Table:
 
 def vee(rng: Generator) -> Table:
     count = int(rng.integers(1, 4))
-    found = {"layout": "vee", **mechanism(rng), **spaced(rng), "throws": throws(rng, count)}
-    found["bank_angle"] = float(rng.choice([45.0, 60.0, 90.0, round(rng.uniform(20.0, 150.0), 2)]))
+    engine = {"layout": "vee", **mechanism(rng), **spaced(rng), "throws": throws(rng, count)}
+    engine["bank_angle"] = float(rng.choice([45.0, 60.0, 90.0, round(rng.uniform(20.0, 150.0), 2)]))
     if rng.random() < 0.5:
-        found["split_pin_angle"] = float(round(rng.uniform(-40.0, 60.0), 2))
+        engine["split_pin_angle"] = float(round(rng.uniform(-40.0, 60.0), 2))
     if rng.random() < 0.5:
-        found["bank_stagger"] = q(rng.uniform(-0.03, 0.03), "m")
-    return found
+        engine["bank_stagger"] = q(rng.uniform(-0.03, 0.03), "m")
+    return engine
 
 
 def boxer(rng: Generator) -> Table:
     count = 2 * int(rng.integers(1, 4))
-    found = {"layout": "boxer", **mechanism(rng), **spaced(rng), "throws": throws(rng, count)}
-    return {**found, "bank_stagger": q(rng.uniform(0.01, 0.05), "m")}
+    engine = {"layout": "boxer", **mechanism(rng), **spaced(rng), "throws": throws(rng, count)}
+    return {**engine, "bank_stagger": q(rng.uniform(0.01, 0.05), "m")}
 
 
 def opposed_piston(rng: Generator) -> Table:
-    found = {
+    engine = {
         "layout": "opposed-piston",
         **mechanism(rng),
         **spaced(rng),
         "throws": throws(rng, int(rng.integers(1, 4))),
     }
-    found.pop("offset", None)
-    reach = 2.0 * float(found["rod_length"].split()[0]) + float(found["stroke"].split()[0])
-    found |= {"crank_distance": q(reach + rng.uniform(0.05, 0.2), "m"), "crank_ratio": int(rng.choice([-1, 1]))}
+    engine.pop("offset", None)
+    reach = 2.0 * float(engine["rod_length"].split()[0]) + float(engine["stroke"].split()[0])
+    engine |= {"crank_distance": q(reach + rng.uniform(0.05, 0.2), "m"), "crank_ratio": int(rng.choice([-1, 1]))}
     if rng.random() < 0.5:
-        found["crank_lead"] = float(round(rng.uniform(3.0, 25.0), 2))
-    return found
+        engine["crank_lead"] = float(round(rng.uniform(3.0, 25.0), 2))
+    return engine
 
 
 def radial(rng: Generator) -> Table:
     count = int(rng.choice([3, 5, 7]))
-    found = {"layout": "radial", **mechanism(rng), "cylinders": count}
-    radius = 0.5 * float(found["stroke"].split()[0])
+    engine = {"layout": "radial", **mechanism(rng), "cylinders": count}
+    radius = 0.5 * float(engine["stroke"].split()[0])
     arm = rng.uniform(0.6, 0.95) * radius
-    found |= {"knuckle_radius": q(arm, "m"), "knuckle_mass": q(rng.uniform(0.0, 0.3), "kg")}
+    engine |= {"knuckle_radius": q(arm, "m"), "knuckle_mass": q(rng.uniform(0.0, 0.3), "kg")}
     if rng.random() < 0.5:
-        found["knuckle_angles"] = [float(round(360.0 * k / count + rng.uniform(-3, 3), 3)) for k in range(1, count)]
+        engine["knuckle_angles"] = [float(round(360.0 * k / count + rng.uniform(-3, 3), 3)) for k in range(1, count)]
     if rng.random() < 0.5:
-        found["articulated_rod_length"] = q(float(found["rod_length"].split()[0]) - arm + rng.uniform(-3e-3, 3e-3), "m")
-    return found
+        engine["articulated_rod_length"] = q(
+            float(engine["rod_length"].split()[0]) - arm + rng.uniform(-3e-3, 3e-3), "m"
+        )
+    return engine
 
 
 def parts(rng: Generator) -> Table:
     """Slider-cranks on two geared shafts, no two alike."""
-    found = {"layout": "parts", **mechanism(rng)}
-    found["shafts"] = [
+    engine = {"layout": "parts", **mechanism(rng)}
+    engine["shafts"] = [
         {"name": "first", "position": ["0.0 m", "0.0 m"]},
         {
             "name": "second", "ratio": int(rng.choice([-1, 1, 2])),
             "position": [q(rng.uniform(0.1, 0.3), "m"), q(rng.uniform(-0.1, 0.1), "m")],
         },
     ]  # fmt: skip
-    found["slider_cranks"] = [
+    engine["slider_cranks"] = [
         {
             "x": q(0.11 * k + rng.uniform(-0.02, 0.02), "m"), "bank_angle": angle(rng), "throw": angle(rng),
             "shaft": str(rng.choice(["first", "second"])),
@@ -165,7 +167,7 @@ def parts(rng: Generator) -> Table:
         }
         for k in range(int(rng.integers(1, 5)))
     ]  # fmt: skip
-    return found
+    return engine
 
 
 # --- everything else of a problem
@@ -177,8 +179,8 @@ def moving_mass(engine: Table) -> float:
         count = engine["cylinders"] if engine["throws"] == "open" else len(engine["throws"])
         return count * number(engine["rotor_mass"]) * number(engine["eccentricity"])
     count = {"vee": 2}.get(engine["layout"], 1)
-    told = engine.get("throws")
-    throw_count = len(told) if isinstance(told, list) else engine.get("cylinders", 1)
+    angles = engine.get("throws")
+    throw_count = len(angles) if isinstance(angles, list) else engine.get("cylinders", 1)
     if engine["layout"] == "parts":
         throw_count = len(engine["slider_cranks"])
     return count * throw_count * middle(engine["reciprocating_mass"]) * 0.5 * float(engine["stroke"].split()[0])
@@ -210,28 +212,28 @@ def points(rng: Generator, maximum: int = 2, low: float = 50.0, high: float = 40
 
 
 def counterweights(rng: Generator, size: float, count: int) -> list[Table]:
-    found = []
+    rows = []
     for k in range(count):
-        told: Table = {
+        entry: Table = {
             "name": f"c{k}", "x": q(rng.uniform(-0.3, 0.3), "m", 4), "radius": "0.06 m",
             "mass": {"between": ["0.0 kg", q(size * rng.uniform(0.1, 1.2) / 0.06, "kg")]},
         }  # fmt: skip
         chance = rng.random()
         if chance < 0.7:
-            told["angle"] = {"between": [0, 360]}
+            entry["angle"] = {"between": [0, 360]}
         elif chance < 0.85:
             low = float(round(rng.uniform(0.0, 300.0), 2))
-            told["angle"] = {"between": [low, low + float(round(rng.uniform(20.0, 170.0), 2))]}
+            entry["angle"] = {"between": [low, low + float(round(rng.uniform(20.0, 170.0), 2))]}
         else:
-            told["angle"] = angle(rng)
+            entry["angle"] = angle(rng)
             if rng.random() < 0.5:
-                told["mass"]["between"][0] = q(0.3 * float(told["mass"]["between"][1].split()[0]), "kg")
-        found.append(told)
-    return found
+                entry["mass"]["between"][0] = q(0.3 * float(entry["mass"]["between"][1].split()[0]), "kg")
+        rows.append(entry)
+    return rows
 
 
 def balancers(rng: Generator, size: float, count: int) -> list[Table]:
-    found = []
+    rows = []
     for k in range(count):
         open_one = {
             "x": q(rng.uniform(-0.2, 0.2), "m", 4), "radius": "0.04 m",
@@ -250,36 +252,40 @@ def balancers(rng: Generator, size: float, count: int) -> list[Table]:
             shaft["unbalances"] = [{"name": "f", **open_one}, second]
         else:
             shaft["unbalances"] = [open_one]
-        found.append(shaft)
-    return found
+        rows.append(shaft)
+    return rows
 
 
-def asked(rng: Generator, table: Table, channels: tuple[str, ...] = LOADS, norms: tuple[str, ...] = NORMS) -> Table:
+def random_term(
+    rng: Generator, table: Table, channels: tuple[str, ...] = LOADS, norms: tuple[str, ...] = NORMS
+) -> Table:
     """A quantity and what narrows it."""
     share = np.array([0.55] + [0.45 / (len(channels) - 1)] * (len(channels) - 1)) if len(channels) > 1 else [1.0]
     channel = str(rng.choice(channels, p=share))
-    found: Table = {"quantity": f"{rng.choice(norms)} {channel}"}
+    term: Table = {"quantity": f"{rng.choice(norms)} {channel}"}
     if rng.random() < 0.35:
-        found["orders"] = [1, 2] if rng.random() < 0.5 else [int(rng.choice([1, 2]))]
+        term["orders"] = [1, 2] if rng.random() < 0.5 else [int(rng.choice([1, 2]))]
     if len(table["operating_points"]) > 1 and rng.random() < 0.3:
-        found["operating_points"] = ["p1"]
+        term["operating_points"] = ["p1"]
     if channel.startswith("mount") and rng.random() < 0.3:
-        found["mounts"] = ["m0", "m2"]
+        term["mounts"] = ["m0", "m2"]
     if (channel.startswith("mount") or channel == "shaking force") and rng.random() < 0.3:
-        found["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.0, 2.0, 3)]
-    return found
+        term["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.0, 2.0, 3)]
+    return term
 
 
 def objective(terms: list[Table]) -> Table:
     if len(terms) == 1:
-        told = {k: v for k, v in terms[0].items() if k not in ("quantity", "weight")}
-        return {"minimise": terms[0]["quantity"], **told}
+        entry = {k: v for k, v in terms[0].items() if k not in ("quantity", "weight")}
+        return {"minimise": terms[0]["quantity"], **entry}
     return {"terms": terms}
 
 
 def with_objective(rng: Generator, table: Table, maximum: int = 2, **kinds: Any) -> Table:
     count = int(rng.integers(1, maximum + 1))
-    terms = [{**asked(rng, table, **kinds), "weight": float(round(rng.uniform(0.2, 3.0), 3))} for _ in range(count)]
+    terms = [
+        {**random_term(rng, table, **kinds), "weight": float(round(rng.uniform(0.2, 3.0), 3))} for _ in range(count)
+    ]
     return {**table, "objective": objective(terms)}
 
 
@@ -309,19 +315,19 @@ def of_unbalances(engine: Engine, most_points: int = 2) -> Callable[[Generator],
 
 def gas_engine(rng: Generator) -> Table:
     """In line, at angles that fire one after the other, no two at once."""
-    found = {"layout": "inline", **mechanism(rng, plain=True), **spaced(rng)}
-    found["bore"] = q(rng.uniform(0.06, 0.12), "m")
-    count, turns = int(rng.integers(1, 5)), 2 if found["cycle"] == "four-stroke" else 1
+    engine = {"layout": "inline", **mechanism(rng, plain=True), **spaced(rng)}
+    engine["bore"] = q(rng.uniform(0.06, 0.12), "m")
+    count, turns = int(rng.integers(1, 5)), 2 if engine["cycle"] == "four-stroke" else 1
     while True:
-        told = throws(rng, count)
+        angles = throws(rng, count)
         laps = [0] + [int(rng.integers(0, turns)) for _ in range(count - 1)]
-        at = [(-t) % 360.0 + 360.0 * lap for t, lap in zip(told, laps, strict=True)]
+        at = [(-t) % 360.0 + 360.0 * lap for t, lap in zip(angles, laps, strict=True)]
         order = [int(k) for k in np.argsort(at)]
         gaps = np.diff([*np.sort(at), 360.0 * turns])
         # each fires at its first dead centre after the one before; the last gap is what is left of the cycle
         if gaps.min() > 5.0 and gaps[:-1].max(initial=0.0) < 359.0:
             break
-    return {**found, "throws": told, "firing_order": [k + 1 for k in order]}
+    return {**engine, "throws": angles, "firing_order": [k + 1 for k in order]}
 
 
 def with_gas(rng: Generator) -> Table:
@@ -357,30 +363,30 @@ def with_states(rng: Generator) -> Table:
 
 def yoke(rng: Generator) -> Table:
     """Rams in line, with levers that weigh something."""
-    found = {**mechanism(rng, plain=True), **spaced(rng), "throws": throws(rng, int(rng.integers(1, 4)))}
-    del found["rod_length"]
+    engine = {**mechanism(rng, plain=True), **spaced(rng), "throws": throws(rng, int(rng.integers(1, 4)))}
+    del engine["rod_length"]
     pivot = rng.uniform(0.08, 0.2)
     lever = {"mass": q(rng.uniform(0.1, 1.0), "kg"), "centre_of_gravity": q(rng.uniform(0.0, 0.9) * pivot, "m")}
-    told: Table = {
-        "layout": "inline", "drive": "swinging-yoke", **found, "pivot_distance": q(pivot, "m"),
+    entry: Table = {
+        "layout": "inline", "drive": "swinging-yoke", **engine, "pivot_distance": q(pivot, "m"),
         "return_ratio": float(round(rng.uniform(1.1, 2.4), 3)),
         "lever": {**lever, "inertia": q(rng.uniform(0.0, 4e-3), "kg m^2")},
     }  # fmt: skip
     if rng.random() < 0.5:
-        told |= {"lever_weight": q(rng.uniform(0.1, 1.0), "kg"), "lever_weight_radius": q(rng.uniform(0.03, 0.1), "m")}
-    return told
+        entry |= {"lever_weight": q(rng.uniform(0.1, 1.0), "kg"), "lever_weight_radius": q(rng.uniform(0.03, 0.1), "m")}
+    return entry
 
 
 def chamber(rng: Generator, count: int) -> Table:
     """Steam or a pump at either end of some cylinders."""
     bore = rng.uniform(0.05, 0.12)
-    told: Table = {"end": str(rng.choice(["head", "crank"])), "bore": q(bore, "m")}
+    entry: Table = {"end": str(rng.choice(["head", "crank"])), "bore": q(bore, "m")}
     if rng.random() < 0.5:
-        told["rod"] = q(rng.uniform(0.1, 0.4) * bore, "m")
+        entry["rod"] = q(rng.uniform(0.1, 0.4) * bore, "m")
     if rng.random() < 0.3:
-        told["cylinders"] = [int(rng.integers(1, count + 1))]
+        entry["cylinders"] = [int(rng.integers(1, count + 1))]
     if rng.random() < 0.25:
-        return {**told, "pump": {"suction": q(rng.uniform(0.5, 0.9), "bar"), "delivery": q(rng.uniform(2, 9), "bar")}}
+        return {**entry, "pump": {"suction": q(rng.uniform(0.5, 0.9), "bar"), "delivery": q(rng.uniform(2, 9), "bar")}}
     cut_off, lead = rng.uniform(0.1, 0.7), rng.uniform(0.0, 0.05)
     steam = {
         "admission": q(rng.uniform(5, 12), "bar"), "back_pressure": q(rng.uniform(0.3, 2.0), "bar"),
@@ -388,12 +394,12 @@ def chamber(rng: Generator, count: int) -> Table:
         "compression": float(round(rng.uniform(lead, 0.3), 3)), "lead": float(round(lead, 3)),
         "clearance": float(round(rng.uniform(0.03, 0.2), 3)),
     }  # fmt: skip
-    return {**told, "steam": steam}
+    return {**entry, "steam": steam}
 
 
 def with_chambers(rng: Generator) -> Table:
     """Engines in line or lists of parts with chambers in place of cylinders of one side."""
-    table = of_unbalances(lambda own: {**inline(own), "cycle": "two-stroke"})(rng)
+    table = of_unbalances(lambda source: {**inline(source), "cycle": "two-stroke"})(rng)
     count = len(table["engine"]["throws"])
     chambers = [{"name": f"k{k}", **chamber(rng, count)} for k in range(int(rng.integers(1, 4)))]
     return {**table, "gas": {"model": "chambers", "chambers": chambers}}
@@ -402,13 +408,13 @@ def with_chambers(rng: Generator) -> Table:
 def crankcase(rng: Generator) -> Table:
     """Weights against main bearings; torque, stored work, twist and irregularity beside them, as limits that hold."""
     engine = {k: v for k, v in gas_engine(rng).items() if k != "rod_inertia_deficit"}
-    size, count, apart = moving_mass(engine), len(engine["throws"]), float(engine["cylinder_spacing"].split()[0])
+    size, count, distance = moving_mass(engine), len(engine["throws"]), float(engine["cylinder_spacing"].split()[0])
     table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
     if rng.random() < 0.6:
         table["gas"] = {
             "model": "seiliger", "peak_pressure": q(rng.uniform(55, 85), "bar"), "imep": q(rng.uniform(6.5, 10), "bar"),
         }  # fmt: skip
-    places = [(0.5 * count - k) * apart + rng.uniform(-0.2, 0.2) * apart for k in range(count + 1)]
+    places = [(0.5 * count - k) * distance + rng.uniform(-0.2, 0.2) * distance for k in range(count + 1)]
     table["main_bearings"] = [{"x": q(x, "m")} for x in places]
     table["counterweights"] = counterweights(rng, size, int(rng.integers(1, 4)))
     inertia = q(rng.uniform(10.0, 40.0) * size, "kg m^2")
@@ -441,19 +447,19 @@ def uneven_crankcase(rng: Generator) -> Table:
     wide = 0.0
     while wide < 3.0:
         table = crankcase(rng)
-        told, turns = table["engine"]["throws"], 2 if table["engine"]["cycle"] == "four-stroke" else 1
+        angles, turns = table["engine"]["throws"], 2 if table["engine"]["cycle"] == "four-stroke" else 1
         # those that move keep away from where another fires, and from a dead centre of their own
-        at = np.sort(np.mod(-np.array(told), 360.0))
+        at = np.sort(np.mod(-np.array(angles), 360.0))
         gaps = np.diff([*at, at[0] + 360.0])
-        wide = 0.4 * float(gaps.min()) if len(told) > 1 else 0.0
+        wide = 0.4 * float(gaps.min()) if len(angles) > 1 else 0.0
     del turns
-    for k in rng.choice(len(told) - 1, int(rng.integers(1, min(len(told), 3))), replace=False) + 1:
+    for k in rng.choice(len(angles) - 1, int(rng.integers(1, min(len(angles), 3))), replace=False) + 1:
         width = min(wide, float(rng.uniform(3.0, 30.0)))
-        told[k] = {"between": [round(told[k] - width, 3), round(told[k] + width, 3)]}
+        angles[k] = {"between": [round(angles[k] - width, 3), round(angles[k] + width, 3)]}
     if rng.random() < 0.5:
         del table["counterweights"]
-    kept = [x for x in table["constraints"] if x["limit"] != "degree of irregularity"]
-    table["constraints"] = kept if rng.random() < 0.5 and kept else []
+    limits = [x for x in table["constraints"] if x["limit"] != "degree of irregularity"]
+    table["constraints"] = limits if rng.random() < 0.5 and limits else []
     if not table["constraints"]:
         del table["constraints"]
     inside = [name for name in INSIDE if name != "shaft twist" or "torsion" in table]
@@ -462,8 +468,8 @@ def uneven_crankcase(rng: Generator) -> Table:
 
 
 def star_of(engine: Table, count: int) -> Table:
-    found = {k: v for k, v in engine.items() if k not in ("throws", "offset", "bank_stagger", "split_pin_angle")}
-    return {**found, "throws": "open", "firing_order": "open", "cylinders": count}
+    keys = {k: v for k, v in engine.items() if k not in ("throws", "offset", "bank_stagger", "split_pin_angle")}
+    return {**keys, "throws": "open", "firing_order": "open", "cylinders": count}
 
 
 def star_problem(rng: Generator, engine: Table) -> Table:
@@ -523,7 +529,7 @@ def block(rng: Generator) -> Table:
 def elastic_mounts(rng: Generator) -> Table:
     """Four mounts, one under each corner, alike in nothing."""
     corners = ((1, 1), (1, -1), (-1, 1), (-1, -1))
-    held = []
+    rows = []
     for k, (along, aside) in enumerate(corners):
         at = (along * rng.uniform(0.2, 0.4), aside * rng.uniform(0.15, 0.4), rng.uniform(-0.1, 0.1))
         place: Table = {"name": f"m{k}", "position": [q(v, "m", 3) for v in at]}
@@ -532,17 +538,17 @@ def elastic_mounts(rng: Generator) -> Table:
             place["damping"] = [q(v, "N s/m", 3) for v in rng.uniform(0.0, 800.0, 3)]
         if rng.random() < 0.4:
             place["turned"] = [float(round(v, 1)) for v in rng.uniform(-30.0, 30.0, 3)]
-        held.append(place)
-    return {"kind": "elastic", "loss_factor": float(rng.choice([0.05, 0.1, 0.2])), "places": held}
+        rows.append(place)
+    return {"kind": "elastic", "loss_factor": float(rng.choice([0.05, 0.1, 0.2])), "places": rows}
 
 
 def opened_stiffness(rng: Generator, mounts: Table, count: int) -> None:
     """So many of the twelve stiffnesses open, from a half or a fifth of theirs to two or five times as much."""
     for k in rng.choice(12, count, replace=False):
         stiffness, axis = mounts["places"][int(k) // 3]["stiffness"], int(k) % 3
-        own, wide = float(stiffness[axis].split()[0]), rng.choice([2.0, 5.0])
+        middle, wide = float(stiffness[axis].split()[0]), rng.choice([2.0, 5.0])
         stiffness[axis] = {
-            "between": [q(own / wide, "N/m", 4), q(own * wide, "N/m", 4)], "start": q(own, "N/m", 4)
+            "between": [q(middle / wide, "N/m", 4), q(middle * wide, "N/m", 4)], "start": q(middle, "N/m", 4)
         }  # fmt: skip
 
 
@@ -558,7 +564,7 @@ ELASTIC = ("mount force", "mount travel")
 SMOOTH = ("mean", "maximum", "rms")
 
 
-def limits_at(rng: Generator, table: Table, among: list[Table], share: float = 0.6) -> Table:
+def limits_at(rng: Generator, table: Table, choices: list[Table], share: float = 0.6) -> Table:
     """Limits a little under or over what a random design has, so that it, or another, keeps them."""
     from attack.openings import Openings
 
@@ -567,16 +573,16 @@ def limits_at(rng: Generator, table: Table, among: list[Table], share: float = 0
     openings = Openings(table)
     scene = openings.scene(openings.random(rng))
     limits: list[Table] = []
-    for k in rng.choice(len(among), min(len(among), int(rng.integers(1, 3))), replace=False):
-        told = dict(among[int(k)])
-        unit, side = told.pop("unit"), told.pop("side")
-        if told["limit"] == "natural frequencies":
+    for k in rng.choice(len(choices), min(len(choices), int(rng.integers(1, 3))), replace=False):
+        entry = dict(choices[int(k)])
+        unit, side = entry.pop("unit"), entry.pop("side")
+        if entry["limit"] == "natural frequencies":
             f = scene.mounting.frequencies  # type: ignore[union-attr]
             has = float(f.max() if side == "max" else f.min())
         else:
-            has = scene.measure({**told, "quantity": told["limit"]})
+            has = scene.measure({**entry, "quantity": entry["limit"]})
         give = rng.uniform(1.0, 1.1) if side == "max" else rng.uniform(0.9, 1.0)
-        limits.append({**told, side: q(has * give, unit, 9) if unit else round(has * give, 9), "name": f"l{k}"})
+        limits.append({**entry, side: q(has * give, unit, 9) if unit else round(has * give, 9), "name": f"l{k}"})
     return {**table, "constraints": limits}
 
 
@@ -650,11 +656,11 @@ def balance_on_elastic(rng: Generator) -> Table:
 def uneven(rng: Generator) -> Table:
     """Throws in line, some of them between bounds of their own, and weights at times."""
     engine = {"layout": "inline", **mechanism(rng), **spaced(rng)}
-    told: list[Any] = list(throws(rng, int(rng.integers(3, 6))))
-    for k in rng.choice(len(told) - 1, int(rng.integers(1, 3)), replace=False) + 1:
+    angles: list[Any] = list(throws(rng, int(rng.integers(3, 6))))
+    for k in rng.choice(len(angles) - 1, int(rng.integers(1, 3)), replace=False) + 1:
         wide = rng.uniform(10.0, 60.0)
-        told[k] = {"between": [round(told[k] - wide, 3), round(told[k] + wide, 3)]}
-    engine["throws"] = told
+        angles[k] = {"between": [round(angles[k] - wide, 3), round(angles[k] + wide, 3)]}
+    engine["throws"] = angles
     table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
     if rng.random() < 0.5:
         table["counterweights"] = counterweights(rng, moving_mass(engine), int(rng.integers(1, 3)))
@@ -668,15 +674,15 @@ def places(rng: Generator) -> Table:
     table = {"engine": built, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
     shafts = balancers(rng, size, int(rng.integers(1, 3)))
     for shaft in shafts:
-        told = shaft["unbalances"][0]
+        entry = shaft["unbalances"][0]
         if rng.random() < 0.6:
-            told["angle"] = angle(rng)
+            entry["angle"] = angle(rng)
         where = int(rng.integers(0, 3))
-        opened = {"between": ["-0.2 m", "0.2 m"]}
+        bounds = {"between": ["-0.2 m", "0.2 m"]}
         if where < 2:
-            shaft["position"][where] = opened
+            shaft["position"][where] = bounds
         else:
-            told["x"] = opened
+            entry["x"] = bounds
     table["balancer_shafts"] = shafts
     return with_objective(rng, table, 1)
 
@@ -759,9 +765,9 @@ def banks(rng: Generator) -> Table:
         "throws": "open",
     }
     engine.pop("offset", None)
-    opened = {"between": [float(round(rng.uniform(20.0, 60.0), 1)), float(round(rng.uniform(80.0, 150.0), 1))]}
+    bounds = {"between": [float(round(rng.uniform(20.0, 60.0), 1)), float(round(rng.uniform(80.0, 150.0), 1))]}
     if rng.random() < 0.6:
-        engine |= {"bank_angle": opened}
+        engine |= {"bank_angle": bounds}
     else:
         engine |= {"bank_angle": float(rng.choice([45.0, 60.0, 90.0])), "split_pin_angle": {"between": [-40.0, 70.0]}}
     if rng.random() < 0.6:
@@ -832,7 +838,7 @@ def sizes(rng: Generator) -> Table:
     count, stroke = len(engine["throws"]), float(engine["stroke"].split()[0])
     size = 1.5 * moving_mass(engine)
     engine["cylinder_spacing"] = q(rng.uniform(1.8, 2.4) * stroke, "m")
-    apart = float(engine["cylinder_spacing"].split()[0])
+    distance = float(engine["cylinder_spacing"].split()[0])
     engine["big_end"] = {
         "diameter": q(rng.uniform(0.5, 0.7) * stroke, "m"),
         "width": q(rng.uniform(0.3, 0.4) * stroke, "m"),
@@ -843,7 +849,7 @@ def sizes(rng: Generator) -> Table:
             "model": "seiliger", "peak_pressure": q(rng.uniform(55, 85), "bar"), "imep": q(rng.uniform(6.5, 10), "bar"),
         }  # fmt: skip
     table["main_bearings"] = [
-        {"name": f"b{k}", "x": q((0.5 * count - k) * apart + rng.uniform(-0.05, 0.05) * apart, "m"),
+        {"name": f"b{k}", "x": q((0.5 * count - k) * distance + rng.uniform(-0.05, 0.05) * distance, "m"),
          "diameter": q(rng.uniform(0.55, 0.75) * stroke, "m"), "width": q(rng.uniform(0.2, 0.35) * stroke, "m")}
         for k in range(count + 1)
     ]  # fmt: skip
@@ -857,12 +863,15 @@ def sizes(rng: Generator) -> Table:
         },
     }  # fmt: skip
     gear = table["running_gear"]
-    among = [(engine["big_end"], "diameter"), (engine["big_end"], "width"), (gear["webs"], "thickness"),
+    choices = [(engine["big_end"], "diameter"), (engine["big_end"], "width"), (gear["webs"], "thickness"),
              (gear["rod"], "diameter"), (gear["piston_pin"], "diameter")]  # fmt: skip
-    for k in rng.choice(len(among), int(rng.integers(1, 4)), replace=False):
-        part, key = among[int(k)]
-        given = float(part[key].split()[0])
-        part[key] = {"between": [q(0.75 * given, "m"), q(1.5 * given, "m")], "start": q(1.2 * given, "m")}
+    for k in rng.choice(len(choices), int(rng.integers(1, 4)), replace=False):
+        part, key = choices[int(k)]
+        drawn = float(part[key].split()[0])
+        part[key] = {
+            "between": [q(0.75 * drawn, "m"), q(1.5 * drawn, "m")],
+            "start": q(1.2 * drawn, "m"),
+        }
     weights, shafts = int(rng.integers(0, 3)), int(rng.integers(0, 2))
     if weights:
         table["counterweights"] = counterweights(rng, size, weights)
@@ -893,15 +902,15 @@ def worst_means(rng: Generator) -> Table:
     family = FAMILIES[str(rng.choice(OF_WORST_MEANS))]
     while len((table := family(rng))["operating_points"]) < 2:
         pass
-    told = dict(table["objective"])
-    terms = [told] if "minimise" in told else [dict(term) for term in told["terms"]]
+    entry = dict(table["objective"])
+    terms = [entry] if "minimise" in entry else [dict(term) for term in entry["terms"]]
     for term in terms:
         key = "minimise" if "minimise" in term else "quantity"
         _, channel = norm_and_channel(term[key])
         if channel in (*LOADS, *ELASTIC):
             term[key] = f"worst mean {channel}"
             term.pop("operating_points", None)
-    return {**table, "objective": terms[0] if "minimise" in told else {"terms": terms}}
+    return {**table, "objective": terms[0] if "minimise" in entry else {"terms": terms}}
 
 
 def root_mean_quads(rng: Generator) -> Table:
@@ -961,24 +970,24 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
 def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
     """Some limits between what the best design without them has and what the one as given has, or under both."""
     from attack.openings import Openings
-    from attack.rivals import convex_rival, designs_told
+    from attack.rivals import convex_rival, stars_of
 
     openings = Openings(table)
     if openings.numbers or "constraints" in table or rng.random() > share:
         return table
-    told = next(iter(designs_told(openings)), None)
-    if told is None:
+    star = next(iter(stars_of(openings)), None)
+    if star is None:
         return table
     zero = np.zeros(openings.size)
-    best, given = openings.scene(convex_rival(openings, zero, told).vector, told), openings.scene(zero, told)
+    best, initial = openings.scene(convex_rival(openings, zero, star).vector, star), openings.scene(zero, star)
     limits: list[Table] = []
     for k in range(int(rng.integers(1, 3))):
         if rng.random() < 0.35:
             ask, high = {"quantity": "added mass"}, best.mass("added mass")
             maximum = high * rng.uniform(0.3, 0.9)
         else:
-            ask = asked(rng, table)
-            low, high = best.measure(ask), given.measure(ask)
+            ask = random_term(rng, table)
+            low, high = best.measure(ask), initial.measure(ask)
             maximum = low * rng.uniform(0.8, 0.98) if rng.random() < 0.5 else low + (high - low) * rng.uniform(0.1, 0.6)
         # what vanishes by itself is no limit
         if maximum > 1e-4 * high > 1e-7:

@@ -19,7 +19,7 @@ from attack.plain_loads import number
 from attack.plain_scene import Scene, Table
 
 Path = tuple[Any, ...]
-OPENED = ("engine", "counterweights", "balancer_shafts", "mounts", "running_gear", "main_bearings")
+OPEN_TABLES = ("engine", "counterweights", "balancer_shafts", "mounts", "running_gear", "main_bearings")
 SIZED = ("running_gear", "main_bearings")
 SIGNS = {"equal": 1.0, "opposite": -1.0, "mirrored": 1.0, "mirrored opposite": -1.0}
 
@@ -82,67 +82,67 @@ class Openings:
 
     @cached_property
     def weights(self) -> tuple[Weight, ...]:
-        found = []
-        for k, told in self._listed("counterweights"):
+        rows = []
+        for k, entry in self._listed("counterweights"):
             shafts = [s["name"] for s in self.table["engine"].get("shafts", [])]
-            at = shafts.index(told["shaft"]) if "shaft" in told else None
-            own: Path | None = None if at is None else ("engine", "shafts", at)
-            ratio = 1.0 if own is None else float(_at(self.table, own).get("ratio", 1))
-            found.append(self._weight(told, ("counterweights", k), own, ratio, "c"))
+            at = shafts.index(entry["shaft"]) if "shaft" in entry else None
+            shaft_path: Path | None = None if at is None else ("engine", "shafts", at)
+            ratio = 1.0 if shaft_path is None else float(_at(self.table, shaft_path).get("ratio", 1))
+            rows.append(self._weight(entry, ("counterweights", k), shaft_path, ratio, "c"))
         for k, shaft in self._listed("balancer_shafts"):
             where: Path = ("balancer_shafts", k)
             for j, u in enumerate(shaft["unbalances"]):
                 single = len(shaft["unbalances"]) == 1 and "name" not in u
                 name = shaft["name"] if single else f"{shaft['name']}.{u.get('name', j + 1)}"
-                told = {**u, "name": name}
-                found.append(
-                    self._weight(told, (*where, "unbalances", j), where, float(shaft["ratio"]), "b", tuple(found))
+                entry = {**u, "name": name}
+                rows.append(
+                    self._weight(entry, (*where, "unbalances", j), where, float(shaft["ratio"]), "b", tuple(rows))
                 )
-        return tuple(found)
+        return tuple(rows)
 
     def _listed(self, key: str) -> list[tuple[int, Table]]:
         return list(enumerate(self.table.get(key, [])))
 
     def _weight(
-        self, told: Table, where: Path, shaft: Path | None, ratio: float, role: str, before: tuple[Weight, ...] = ()
+        self, entry: Table, where: Path, shaft: Path | None, ratio: float, role: str, before: tuple[Weight, ...] = ()
     ) -> Weight:
-        if "coupled" in told:
-            leader = next(w for w in before if w.name == told["coupled"]["to"])
-            how = told["coupled"]["as"]
+        if "coupled" in entry:
+            leader = next(w for w in before if w.name == entry["coupled"]["to"])
+            how = entry["coupled"]["as"]
             follows = (leader.name, SIGNS[how], how.startswith("mirrored"))
-            radius = number(told.get("radius", leader.radius))
-            return Weight(told["name"], where, shaft, ratio, radius, role, 0.0, leader.maximum, None, follows)
-        radius = number(told.get("radius", 1.0))
-        size = told["mass"] if "mass" in told else told["unbalance"]
-        gain = radius if "mass" in told else 1.0
+            radius = number(entry.get("radius", leader.radius))
+            return Weight(entry["name"], where, shaft, ratio, radius, role, 0.0, leader.maximum, None, follows)
+        radius = number(entry.get("radius", 1.0))
+        size = entry["mass"] if "mass" in entry else entry["unbalance"]
+        gain = radius if "mass" in entry else 1.0
         minimum, maximum = (number(v) * gain for v in (size["between"] if is_open(size) else (size, size)))
-        angle = told.get("angle", 0.0)
+        angle = entry.get("angle", 0.0)
         low, high = (math.radians(v) for v in (angle["between"] if is_open(angle) else (angle, angle)))
         sector = None if high - low > 6.28 else (low, high)
-        return Weight(told["name"], where, shaft, ratio, radius, role, minimum, maximum, sector)
+        return Weight(entry["name"], where, shaft, ratio, radius, role, minimum, maximum, sector)
 
     @cached_property
     def numbers(self) -> tuple[tuple[Path, float, float], ...]:
         """Paths and bounds of open numbers, but sizes and angles of unbalances and the angles of even stars."""
         steps = self.table["engine"].get("throws") == "open" and "intervals" not in self.table.get("phasing", {})
-        found: list[tuple[Path, float, float]] = []
+        rows: list[tuple[Path, float, float]] = []
 
         def look(value: Any, path: Path) -> None:
             if is_open(value):
                 if path[0] in ("engine", "mounts", *SIZED) or path[-1] not in ("mass", "unbalance", "angle"):
-                    found.append((path, *(number(v) for v in value["between"])))
+                    rows.append((path, *(number(v) for v in value["between"])))
             elif isinstance(value, dict | list):
                 for key, part in value.items() if isinstance(value, dict) else enumerate(value):
                     look(part, (*path, key))
 
-        for key in OPENED:
+        for key in OPEN_TABLES:
             if key == "engine" and steps:
                 # angles of stars are chosen and not moved
-                for own in ("reciprocating_mass", "rod_length"):
-                    look(self.table["engine"].get(own), (key, own))
+                for name in ("reciprocating_mass", "rod_length"):
+                    look(self.table["engine"].get(name), (key, name))
             else:
                 look(self.table.get(key), (key,))
-        return tuple(found)
+        return tuple(rows)
 
     @property
     def size(self) -> int:
@@ -164,11 +164,11 @@ class Openings:
 
     def parts(self, vector: np.ndarray) -> list[tuple[Weight, np.ndarray]]:
         """Every weight with its entries."""
-        found, at = [], len(self.numbers)
+        slices, at = [], len(self.numbers)
         for w in self.weights:
-            found.append((w, vector[at : at + w.entries]))
+            slices.append((w, vector[at : at + w.entries]))
             at += w.entries
-        return found
+        return slices
 
     def nearest(self, vector: np.ndarray) -> np.ndarray:
         """The vector brought into its bounds, discs and sectors."""
@@ -187,10 +187,10 @@ class Openings:
         vector = rng.uniform(*self.box.T) if self.size else np.zeros(0)
         return self.nearest(vector)
 
-    def scene(self, vector: np.ndarray, told: Table | None = None, order: tuple[int, ...] | None = None) -> Scene:
+    def scene(self, vector: np.ndarray, star: Table | None = None, order: tuple[int, ...] | None = None) -> Scene:
         """The design of a vector; `told` replaces keys of [engine] (a star, a bank)."""
-        table = {**self.table, **{key: copy.deepcopy(self.table[key]) for key in OPENED if key in self.table}}
-        table["engine"].update(told or {})
+        table = {**self.table, **{key: copy.deepcopy(self.table[key]) for key in OPEN_TABLES if key in self.table}}
+        table["engine"].update(star or {})
         for (path, low, high), share in zip(self.numbers, vector, strict=False):
             holder = table
             for key in path[:-1]:
@@ -199,20 +199,20 @@ class Openings:
         return Scene(table, self._rotors(table, vector), order)
 
     def _rotors(self, table: Table, vector: np.ndarray) -> list[tuple[Any, ...]]:
-        found: dict[str, tuple[Any, ...]] = {}
+        rotors: dict[str, tuple[Any, ...]] = {}
         for w, part in self.parts(vector):
-            own = _at(table, w.where)
+            entry = _at(table, w.where)
             y, z = (number(v) for v in _at(table, w.shaft)["position"]) if w.shaft else (0.0, 0.0)
             if w.follows:
                 name, sign, mirrored = w.follows
-                leader = found[name][4]
+                leader = rotors[name][4]
                 u = sign * (leader.conjugate() if mirrored else leader)
             else:
                 u = w.unbalance(part)
-            found[w.name] = (w.name, number(own["x"]), complex(z, y), w.ratio, u, w.radius, w.role)
-        return list(found.values())
+            rotors[w.name] = (w.name, number(entry["x"]), complex(z, y), w.ratio, u, w.radius, w.role)
+        return list(rotors.values())
 
-    def read(self, engine: Any, told: dict[str, float]) -> tuple[np.ndarray, Table]:
+    def read(self, engine: Any, decisions: dict[str, float]) -> tuple[np.ndarray, Table]:
         """The vector of an engine that was decided, and its throws and angles where these are open as a whole.
 
         Numbers of mounts are taken from what is told of decisions, by their names.
@@ -220,7 +220,9 @@ class Openings:
         An unbalance that is missing belongs to a shaft that is not built.
         """
         rotors = {r.name: r for r in engine.rotors}
-        values = [(self._number(path, engine, rotors, told) - low) / (high - low) for path, low, high in self.numbers]
+        values = [
+            (self._number(path, engine, rotors, decisions) - low) / (high - low) for path, low, high in self.numbers
+        ]
         for w in self.weights:
             u = rotors[w.name].unbalance if w.name in rotors else 0j
             if w.entries == 2:
@@ -235,13 +237,13 @@ class Openings:
         if e.get("throws") != "open" or e["layout"] not in ("inline", "vee", "rotary"):
             return {}
         throws, bank, split = self._angles(engine)
-        told: Table = {"throws": [math.degrees(t) for t in throws]}
+        star: Table = {"throws": [math.degrees(t) for t in throws]}
         if "single_cylinders" in e or "row_angle" in e:
             fires = [p.firing_angle for p in engine.slider_cranks]
-            told["firing_order"] = sorted(range(1, len(fires) + 1), key=lambda n: fires[n - 1])
+            star["firing_order"] = sorted(range(1, len(fires) + 1), key=lambda n: fires[n - 1])
         if e["layout"] == "vee":
-            told |= {"bank_angle": math.degrees(bank), "split_pin_angle": math.degrees(split)}
-        return told
+            star |= {"bank_angle": math.degrees(bank), "split_pin_angle": math.degrees(split)}
+        return star
 
     def _angles(self, engine: Any) -> tuple[list[float], float, float]:
         """Throws, bank and split pin [rad]."""
@@ -250,10 +252,10 @@ class Openings:
             return [p.throw for p in parts], 0.0, 0.0
         half = len(parts) // 2
         split = math.remainder(parts[half].throw - parts[0].throw, math.tau)
-        told = self.table["engine"].get("split_pin_angle", 0.0)
-        if not is_open(told):
-            split = math.radians(told)
-        elif split < math.radians(told["between"][0]) - 1e-9:
+        stated = self.table["engine"].get("split_pin_angle", 0.0)
+        if not is_open(stated):
+            split = math.radians(stated)
+        elif split < math.radians(stated["between"][0]) - 1e-9:
             split += math.tau
         return [p.throw + 0.5 * split for p in parts[:half]], parts[0].bank - parts[half].bank, split
 
@@ -272,9 +274,9 @@ class Openings:
             throws, bank, split = self._angles(engine)
             if path[1] == "throws":
                 low, high = (float(v) for v in _at(self.table, path)["between"])
-                given = math.degrees(throws[path[2]])
-                turns = round((0.5 * (low + high) - given) / 360.0)
-                return given + 360.0 * turns
+                angle = math.degrees(throws[path[2]])
+                turns = round((0.5 * (low + high) - angle) / 360.0)
+                return angle + 360.0 * turns
             return math.degrees({"bank_angle": bank, "split_pin_angle": split}[path[1]])
         if path[0] == "mounts":
             label = ".".join([self.table["mounts"]["places"][path[2]]["name"], path[3], *("xyz"[k] for k in path[4:])])
@@ -294,10 +296,10 @@ def _at(table: Any, path: Path) -> Any:
 def _into_sector(point: np.ndarray, low: float, high: float) -> np.ndarray:
     """Nearest point of a sector of at most half a turn."""
     z, middle_angle, half = complex(*point), 0.5 * (low + high), 0.5 * (high - low)
-    own = z * cmath.exp(-1j * middle_angle)
-    if abs(cmath.phase(own)) <= half or own == 0:
+    turned = z * cmath.exp(-1j * middle_angle)
+    if abs(cmath.phase(turned)) <= half or turned == 0:
         return point
-    edge = cmath.exp(1j * math.copysign(half, own.imag))
-    along = max((own * edge.conjugate()).real, 0.0)
+    edge = cmath.exp(1j * math.copysign(half, turned.imag))
+    along = max((turned * edge.conjugate()).real, 0.0)
     moved = along * edge * cmath.exp(1j * middle_angle)
     return np.array([moved.real, moved.imag])

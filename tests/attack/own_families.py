@@ -23,7 +23,7 @@ from attack.families import (
     vee,
 )  # fmt: skip
 from attack.own_loads import si
-from attack.own_problem import Designs, Own, opened
+from attack.own_problem import Designs, OwnModel, open_numbers_of
 from attack.own_runs import MEASURES as OF_RUNS
 from attack.plain_scene import Table
 
@@ -40,13 +40,13 @@ def scene(rng: Generator, most_points: int, plain: bool) -> Table:
     """Engine, gas, points and a block on mounts, all given; `plain` has nothing that no bound knows."""
     chance = rng.random()
     engine = gas_engine(rng) if chance < 0.5 else (inline, vee, boxer)[int(rng.integers(3))](rng)
-    held = block(rng)
+    mass = block(rng)
     mirrored = rng.random() < 0.25
     if mirrored:
-        held["centre_of_gravity"][1] = "0.0 m"
-        held["inertia_products"] = ["0.0 kg m^2", held["inertia_products"][1], "0.0 kg m^2"]
+        mass["centre_of_gravity"][1] = "0.0 m"
+        mass["inertia_products"] = ["0.0 kg m^2", mass["inertia_products"][1], "0.0 kg m^2"]
     if rng.random() < 0.25:
-        held["turning_inertia"] = q(rng.uniform(0.05, 0.4), "kg m^2", 3)
+        mass["turning_inertia"] = q(rng.uniform(0.05, 0.4), "kg m^2", 3)
     points = [
         {
             "name": f"p{k}", "speed": q(math.exp(rng.uniform(math.log(60.0), math.log(420.0))), "rad/s"),
@@ -54,7 +54,7 @@ def scene(rng: Generator, most_points: int, plain: bool) -> Table:
         }
         for k in range(int(rng.integers(1, most_points + 1)))
     ]  # fmt: skip
-    table: Table = {"engine": engine, "operating_points": points, "block": held, "mounts": mounts(rng, mirrored, plain)}
+    table: Table = {"engine": engine, "operating_points": points, "block": mass, "mounts": mounts(rng, mirrored, plain)}
     if chance < 0.42:
         table["gas"] = gas(rng)
         if len(points) > 1 and rng.random() < 0.5:
@@ -85,44 +85,44 @@ def mounts(rng: Generator, mirrored: bool, plain: bool) -> Table:
             places.append({"name": f"m{k}r", "mirror_of": f"m{k}"})
     if not mirrored and rng.random() < 0.12:
         places.append({"name": "mj", "joined_to": "m1", **springs(rng, True)})
-    found: Table = {"kind": "elastic", "loss_factor": float(rng.choice([0.03, 0.05, 0.1, 0.2])), "places": places}
+    table: Table = {"kind": "elastic", "loss_factor": float(rng.choice([0.03, 0.05, 0.1, 0.2])), "places": places}
     if not plain and rng.random() < 0.2:
-        found["damping_per_stiffness"] = q(rng.uniform(1e-4, 1.5e-3), "s", 3)
-    return found
+        table["damping_per_stiffness"] = q(rng.uniform(1e-4, 1.5e-3), "s", 3)
+    return table
 
 
 def springs(rng: Generator, plain: bool) -> Table:
-    found: Table = {"stiffness": [q(v, "N/m", 4) for v in np.exp(rng.uniform(math.log(6e4), math.log(7e5), 3))]}
+    table: Table = {"stiffness": [q(v, "N/m", 4) for v in np.exp(rng.uniform(math.log(6e4), math.log(7e5), 3))]}
     if rng.random() < 0.4:
-        found["damping"] = [q(v, "N s/m", 3) for v in rng.uniform(0, 900, 3)]
+        table["damping"] = [q(v, "N s/m", 3) for v in rng.uniform(0, 900, 3)]
     if rng.random() < 0.45:
-        found["turned"] = [float(round(v, 1)) for v in rng.uniform(-40, 40, 3) * (rng.random(3) < 0.7)]
+        table["turned"] = [float(round(v, 1)) for v in rng.uniform(-40, 40, 3) * (rng.random(3) < 0.7)]
     if rng.random() < 0.2:
-        found["loss_factor"] = float(round(rng.uniform(0.02, 0.3), 3))
+        table["loss_factor"] = float(round(rng.uniform(0.02, 0.3), 3))
     if not plain and rng.random() < 0.1:
-        found["fluid_track"] = {
+        table["fluid_track"] = {
             "axis": "z", "mass": q(rng.uniform(10, 60), "kg", 3), "bulge_stiffness": q(rng.uniform(1e5, 3e5), "N/m", 3),
             "chamber_stiffness": q(rng.uniform(2e3, 1e4), "N/m", 3), "damping": q(rng.uniform(200, 1500), "N s/m", 3),
         }  # fmt: skip
-    return found
+    return table
 
 
 def open_numbers(rng: Generator, table: Table, kinds: list[str]) -> None:
     """One number a kind, of any mount that has its own; one that is open already stays."""
-    own = [place for place in table["mounts"]["places"] if "stiffness" in place]
+    places = [place for place in table["mounts"]["places"] if "stiffness" in place]
     for kind in kinds:
-        place, axis = own[int(rng.integers(len(own)))], int(rng.integers(3))
+        place, axis = places[int(rng.integers(len(places)))], int(rng.integers(3))
         if kind == "stiffness" and isinstance(place["stiffness"][axis], str):
-            given, wide = si(place["stiffness"][axis]), float(rng.choice([1.6, 2.5, 5.0, 8.0]))
-            middle = given * wide ** rng.uniform(-0.5, 0.5)
-            place["stiffness"][axis] = _between(middle / wide, middle * wide, given, "N/m")
+            value, wide = si(place["stiffness"][axis]), float(rng.choice([1.6, 2.5, 5.0, 8.0]))
+            middle = value * wide ** rng.uniform(-0.5, 0.5)
+            place["stiffness"][axis] = _between(middle / wide, middle * wide, value, "N/m")
         elif kind == "position" and isinstance(place.get("position", [None] * 3)[axis], str):
-            given, wide = si(place["position"][axis]), rng.uniform(0.03, 0.15)
-            place["position"][axis] = _between(given - wide, given + wide, given, "m")
+            value, wide = si(place["position"][axis]), rng.uniform(0.03, 0.15)
+            place["position"][axis] = _between(value - wide, value + wide, value, "m")
         elif kind == "turned" and not isinstance(place.setdefault("turned", [0.0] * 3)[axis], dict):
-            given = place["turned"][axis]
-            low, high = (round(given + side * rng.uniform(5, 60), 1) for side in (-1.0, 1.0))
-            place["turned"][axis] = {"between": [float(low), float(high)], "start": given}
+            value = place["turned"][axis]
+            low, high = (round(value + side * rng.uniform(5, 60), 1) for side in (-1.0, 1.0))
+            place["turned"][axis] = {"between": [float(low), float(high)], "start": value}
         elif kind == "loss" and not isinstance(place.get("loss_factor"), dict):
             place["loss_factor"] = {"between": [0.02, 0.35], "start": 0.1}
         elif kind == "damping" and not isinstance(place.setdefault("damping", ["0.0 N s/m"] * 3)[axis], dict):
@@ -150,27 +150,27 @@ def load_cases(rng: Generator, table: Table) -> None:
         table["load_cases"].append(hit)
 
 
-def asked_load(rng: Generator, table: Table) -> Table:
+def random_load(rng: Generator, table: Table) -> Table:
     channel = str(rng.choice(["mount force", "mount travel"], p=[0.7, 0.3]))
-    found: Table = {"quantity": f"{rng.choice(['mean', 'maximum', 'rms'])} {channel}"}
+    term: Table = {"quantity": f"{rng.choice(['mean', 'maximum', 'rms'])} {channel}"}
     if rng.random() < 0.3:
-        found["orders"] = [1, 2] if rng.random() < 0.5 else [int(rng.choice([1, 2]))]
+        term["orders"] = [1, 2] if rng.random() < 0.5 else [int(rng.choice([1, 2]))]
     if len(table["operating_points"]) > 1 and rng.random() < 0.25:
-        found["operating_points"] = ["p1"]
+        term["operating_points"] = ["p1"]
     names = [place["name"] for place in table["mounts"]["places"] if "joined_to" not in place]
     if rng.random() < 0.2:
-        found["mounts"] = [names[0], names[-1]]
+        term["mounts"] = [names[0], names[-1]]
     if rng.random() < 0.2:
-        found["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.1, 2, 3)]
-    return found
+        term["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.1, 2, 3)]
+    return term
 
 
-def asked_number(rng: Generator, table: Table) -> Table:
+def random_number(rng: Generator, table: Table) -> Table:
     """Of block and mounts; those of one stiffness where no fluid has another."""
-    among: list[Table] = [{"quantity": "transmissibility"}, {"quantity": "transmissibility", "orders": [1]}]
-    among.append({"quantity": "static sag"})
+    terms: list[Table] = [{"quantity": "transmissibility"}, {"quantity": "transmissibility", "orders": [1]}]
+    terms.append({"quantity": "static sag"})
     if "fluid_track" not in json.dumps(table["mounts"]):
-        among += [
+        terms += [
             {"quantity": "torque-roll residual", "frequency": q(rng.uniform(5, 20), "Hz", 4)},
             {"quantity": "raw torque-roll residual"},
             {"quantity": "raw torque-roll residual", "frequency": {"between": ["6.0 Hz", "14.0 Hz"]}},
@@ -178,34 +178,34 @@ def asked_number(rng: Generator, table: Table) -> Table:
             {"quantity": "decoupling shortfall", "motions": ["roll", "bounce"], "wanted": 0.95},
         ]
     if "load_cases" in table:
-        among += [{"quantity": "static travel"}, {"quantity": "static mount force", "load_cases": ["bump"]}] * 2
-    return dict(among[int(rng.integers(len(among)))])
+        terms += [{"quantity": "static travel"}, {"quantity": "static mount force", "load_cases": ["bump"]}] * 2
+    return dict(terms[int(rng.integers(len(terms)))])
 
 
 def limits(rng: Generator, table: Table, count: int) -> list[Table]:
-    own = Own(table, 512, 1e-9)
-    low, high = own.box.T
-    one, many = (own.designs(low + (high - low) * rng.random((n, len(low)))) for n in (1, 60))
-    hard, found = rng.random() < 0.3, []
+    model = OwnModel(table, 512, 1e-9)
+    low, high = model.box.T
+    one, many = (model.designs(low + (high - low) * rng.random((n, len(low)))) for n in (1, 60))
+    hard, rows = rng.random() < 0.3, []
     for k in range(count):
         chance = rng.random()
         if chance < 0.3 and "fluid_track" not in json.dumps(table["mounts"]):
-            told = frequency_limit(rng, one, many, hard)
+            entry = frequency_limit(rng, one, many, hard)
         else:
-            told = asked_load(rng, table) if chance < 0.6 else asked_number(rng, table)
-            maximum = float(one.measure(told)[0]) * rng.uniform(1.0, 1.08)
+            entry = random_load(rng, table) if chance < 0.6 else random_number(rng, table)
+            maximum = float(one.measure(entry)[0]) * rng.uniform(1.0, 1.08)
             if hard and rng.random() < 0.6:
-                maximum = float(many.measure(told).min()) * rng.uniform(0.85, 1.01)
+                maximum = float(many.measure(entry).min()) * rng.uniform(0.85, 1.01)
             if maximum < 1e-9:
                 continue
-            unit = unit_of(told["quantity"])
-            told = {
-                "limit": told.pop("quantity"),
-                **told,
+            unit = unit_of(entry["quantity"])
+            entry = {
+                "limit": entry.pop("quantity"),
+                **entry,
                 "max": q(maximum, unit, 9) if unit else float(f"{maximum:.9g}"),
             }
-        found.append({**told, "name": f"l{k}"})
-    return found
+        rows.append({**entry, "name": f"l{k}"})
+    return rows
 
 
 def frequency_limit(rng: Generator, one: Designs, many: Designs, hard: bool) -> Table:
@@ -213,11 +213,11 @@ def frequency_limit(rng: Generator, one: Designs, many: Designs, hard: bool) -> 
     f, every, chance = np.sort(one.blocks.modes[0][0]), many.blocks.modes[0], rng.random()
     if chance < 0.2:
         motions = [str(m) for m in rng.choice(["roll", "bounce", "pitch", "lateral"], 2, replace=False)]
-        told: Table = {"quantity": "kinetic-energy decoupling", "motions": motions}
+        entry: Table = {"quantity": "kinetic-energy decoupling", "motions": motions}
         minimum = (
-            float(many.measure(told).max()) * 1.01 if hard else float(one.measure(told)[0]) * rng.uniform(0.92, 1.0)
+            float(many.measure(entry).max()) * 1.01 if hard else float(one.measure(entry)[0]) * rng.uniform(0.92, 1.0)
         )
-        return {"limit": told.pop("quantity"), **told, "min": float(f"{min(minimum, 0.999):.9g}")}
+        return {"limit": entry.pop("quantity"), **entry, "min": float(f"{min(minimum, 0.999):.9g}")}
     if chance < 0.45:
         minimum = every.min(axis=1).max() * rng.uniform(0.98, 1.05) if hard else f[0] * rng.uniform(0.93, 1.0)
         return {"limit": "natural frequencies", "min": q(minimum, "Hz", 9)}
@@ -229,8 +229,8 @@ def frequency_limit(rng: Generator, one: Designs, many: Designs, hard: bool) -> 
     return {"limit": "natural frequencies", "outside": [q(f[k] + inset, "Hz", 9), q(f[k + 1] - inset, "Hz", 9)]}
 
 
-def objective(told: Table) -> Table:
-    return {"minimise": told["quantity"], **{key: value for key, value in told.items() if key != "quantity"}}
+def objective(entry: Table) -> Table:
+    return {"minimise": entry["quantity"], **{key: value for key, value in entry.items() if key != "quantity"}}
 
 
 def any_mounts(rng: Generator) -> Table:
@@ -239,20 +239,20 @@ def any_mounts(rng: Generator) -> Table:
     table = scene(rng, 3, plain)
     if rng.random() < 0.3:
         load_cases(rng, table)
-    among = ["stiffness", "position", "turned", "weight", "loss", "damping", "lag"]
+    allowed = ["stiffness", "position", "turned", "weight", "loss", "damping", "lag"]
     shares = [0.5, 0.2, 0.2, 0.1, 0.0, 0.0, 0.0] if plain else [0.4, 0.16, 0.16, 0.1, 0.05, 0.08, 0.05]
     count = int(rng.integers(1, 6))
-    kinds = ["stiffness"] * count if rng.random() < 0.35 else [str(k) for k in rng.choice(among, count, p=shares)]
+    kinds = ["stiffness"] * count if rng.random() < 0.35 else [str(k) for k in rng.choice(allowed, count, p=shares)]
     open_numbers(rng, table, kinds)
     if "weight" in kinds:
         table["counterweights"] = counterweights(rng, moving_mass(table["engine"]), 1)
         if rng.random() < 0.3:
             table["balancer_shafts"] = balancers(rng, moving_mass(table["engine"]), 1)
-    if not opened(table):
+    if not open_numbers_of(table):
         open_numbers(rng, table, ["stiffness"])
-    table["objective"] = objective(asked_load(rng, table) if rng.random() < 0.7 else asked_number(rng, table))
-    if found := limits(rng, table, int(rng.integers(0, 4))):
-        table["constraints"] = found
+    table["objective"] = objective(random_load(rng, table) if rng.random() < 0.7 else random_number(rng, table))
+    if rows := limits(rng, table, int(rng.integers(0, 4))):
+        table["constraints"] = rows
     return {**table, "search": {"boxes": 20, "starts": 5}}
 
 
@@ -272,9 +272,9 @@ def run_ups(rng: Generator) -> Table:
     if rng.random() < 0.3:
         table["objective"] = {"minimise": measure}
     else:
-        own = Own(table, 256, 1e-9)
-        low, high = own.box.T
-        has = own.designs(low + (high - low) * rng.random((12, len(low)))).measure({"quantity": measure})
+        model = OwnModel(table, 256, 1e-9)
+        low, high = model.box.T
+        has = model.designs(low + (high - low) * rng.random((12, len(low)))).measure({"quantity": measure})
         maximum = has[0] * rng.uniform(1.0, 1.05) if rng.random() < 0.6 else has.min() * rng.uniform(0.8, 1.02)
         table["objective"] = {"minimise": f"{rng.choice(['mean', 'maximum', 'rms'])} mount force"}
         table["constraints"] = [{"limit": measure, "max": q(float(maximum), unit_of(measure), 9), "name": "l0"}]

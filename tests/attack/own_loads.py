@@ -30,11 +30,11 @@ UNITS = {
 }  # fmt: skip
 
 
-def si(told: Any) -> float:
+def si(quantity: Any) -> float:
     """A number of a problem file in SI units; without a unit as it is."""
-    if not isinstance(told, str):
-        return float(told)
-    number, unit = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)", told).groups()  # type: ignore[union-attr]
+    if not isinstance(quantity, str):
+        return float(quantity)
+    number, unit = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)", quantity).groups()  # type: ignore[union-attr]
     return float(number) * UNITS[unit.strip()]
 
 
@@ -88,15 +88,15 @@ def cylinders_and_pins(engine: Table) -> tuple[list[Cylinder], list[tuple[float,
     stagger = si(engine.get("bank_stagger", 0.0))
     if engine["layout"] == "boxer":
         sides = [(0.5, at[k % count], t) if k < count else (-0.5, at[k % count], t) for k, t in enumerate(throws)]
-        found = [Cylinder(x + s * stagger, t, s * math.pi, *common) for s, x, t in sides]
-        return found, [(c.x, c.throw, turning) for c in found]
+        cylinders = [Cylinder(x + s * stagger, t, s * math.pi, *common) for s, x, t in sides]
+        return cylinders, [(c.x, c.throw, turning) for c in cylinders]
     assert engine["layout"] == "vee"
     bank, split = math.radians(float(engine["bank_angle"])), math.radians(float(engine.get("split_pin_angle", 0.0)))
-    found = [
+    cylinders = [
         Cylinder(x + s * stagger, t - s * split, s * bank, *common)
         for s in (0.5, -0.5) for x, t in zip(at, throws, strict=True)
     ]  # fmt: skip
-    return found, [(x, t, turning) for x, t in zip(at, throws, strict=True)]
+    return cylinders, [(x, t, turning) for x, t in zip(at, throws, strict=True)]
 
 
 def derivative(samples: np.ndarray) -> np.ndarray:
@@ -111,8 +111,8 @@ def of_pistons(cylinders: list[Cylinder], turns: int, count: int) -> np.ndarray:
     for c in cylinders:
         alpha = phi + c.throw - c.bank
         aside = c.radius * np.sin(alpha) - c.offset
-        own = c.radius * np.cos(alpha) + np.sqrt(c.rod**2 - aside**2) + 1j * c.offset
-        place = own * np.exp(1j * c.bank)
+        travel = c.radius * np.cos(alpha) + np.sqrt(c.rod**2 - aside**2) + 1j * c.offset
+        place = travel * np.exp(1j * c.bank)
         speed = derivative(place)
         lean = -np.arcsin(aside / c.rod)
         lean_rate = derivative(lean.astype(complex)).real
@@ -126,11 +126,11 @@ def of_pistons(cylinders: list[Cylinder], turns: int, count: int) -> np.ndarray:
         # a force (0, Fy, Fz) at x
         total[4] -= c.x * force.real
         total[5] += c.x * force.imag
-    found = np.fft.rfft(total, axis=1).T / STEPS
-    found[1:] *= 2.0
+    series = np.fft.rfft(total, axis=1).T / STEPS
+    series[1:] *= 2.0
     out = np.zeros((count, 6), complex)
-    kept = found[: min(len(found) - 1, (count - 1) // turns + 1)]
-    out[: len(kept) * turns : turns] = kept
+    orders = series[: min(len(series) - 1, (count - 1) // turns + 1)]
+    out[: len(orders) * turns : turns] = orders
     return out
 
 
@@ -230,9 +230,9 @@ def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
     moment = -s.area * (p - si(gas.get("crankcase_pressure", AIR))) * s.slope(a)
     n = np.arange(HIGHEST + 1)
     turned = np.exp(-1j * np.outer(n, a.ravel()) / s.turns)
-    found = turned @ (moment * w).ravel() * 2.0 / whole
-    found[0] *= 0.5
-    return found
+    work = turned @ (moment * w).ravel() * 2.0 / whole
+    work[0] *= 0.5
+    return work
 
 
 def _mixed(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:

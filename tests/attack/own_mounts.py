@@ -20,13 +20,13 @@ KEYS = ("stiffness", "loss_factor", "damping", "damping_per_stiffness", "stop", 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
-def numbers(told: Any, count: int) -> np.ndarray:
+def numbers(entry: Any, count: int) -> np.ndarray:
     """(count, ...) of a number, a list of them, or what was put in for open ones."""
-    if isinstance(told, np.ndarray):
-        return told
-    if isinstance(told, list):
-        return np.stack([numbers(v, count) for v in told], axis=1)
-    return np.full(count, si(told))
+    if isinstance(entry, np.ndarray):
+        return entry
+    if isinstance(entry, list):
+        return np.stack([numbers(v, count) for v in entry], axis=1)
+    return np.full(count, si(entry))
 
 
 def crossed(r: np.ndarray) -> np.ndarray:
@@ -81,9 +81,9 @@ class Blocks:
     stops: np.ndarray
     place: list[int]
 
-    def along(self, own: np.ndarray) -> np.ndarray:
+    def along(self, along_axes: np.ndarray) -> np.ndarray:
         """(..., mounts, 3, 3) of values along own axes (..., mounts, 3)."""
-        return (self.axes * own[..., None, :]) @ np.swapaxes(self.axes, -1, -2)
+        return (self.axes * along_axes[..., None, :]) @ np.swapaxes(self.axes, -1, -2)
 
     def summed(self, parts: np.ndarray) -> np.ndarray:
         """(count, 6, 6) of (count, mounts, 3, 3)."""
@@ -105,7 +105,7 @@ class Blocks:
     @cached_property
     def _laws(self) -> list[np.ndarray]:
         """Stiffness at rest, what is lost of it, damping: (count, mounts, 3, 3)."""
-        return [self.along(own) for own in (self.at_rest, self.loss, self.damping)]
+        return [self.along(along_axes) for along_axes in (self.at_rest, self.loss, self.damping)]
 
     @cached_property
     def _sums(self) -> list[np.ndarray]:
@@ -189,15 +189,15 @@ class Blocks:
         s = np.clip(pulled @ inert / (inert @ inert), *((2.0 * math.pi * f) ** 2 for f in band))
         return np.linalg.norm(pulled - s[:, None] * inert, axis=-1)
 
-    def held(self, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def static_answer(self, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Travel and forces (count, mounts, 3) under a load (6,) about the centre of gravity: the least energy."""
         gap, hard = self.stops[:, 0, None], self.stops[:, 1, None]
         count = len(self.moves)
-        own = np.einsum("bmki,bmkj->bmij", self.axes, self.moves)
+        along_axes = np.einsum("bmki,bmkj->bmij", self.axes, self.moves)
         q = np.zeros((count, 6))
 
         def parts(q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            u = np.einsum("bmij,bj->bmi", own, q)
+            u = np.einsum("bmij,bj->bmi", along_axes, q)
             beyond = np.sign(u) * np.maximum(np.abs(u) - gap, 0.0)
             energy = 0.5 * np.sum(self.at_rest * u**2 + hard * beyond**2, axis=(1, 2)) - q @ wrench
             return u, beyond, energy
@@ -205,9 +205,11 @@ class Blocks:
         for _ in range(200):
             u, beyond, energy = parts(q)
             force = self.at_rest * u + hard * beyond
-            slope = np.einsum("bmij,bmi->bj", own, force) - wrench
+            slope = np.einsum("bmij,bmi->bj", along_axes, force) - wrench
             stiff = self.at_rest + hard * (np.abs(u) > gap)
-            step = np.linalg.solve(np.einsum("bmki,bmk,bmkj->bij", own, stiff, own), -slope[..., None])[..., 0]
+            step = np.linalg.solve(np.einsum("bmki,bmk,bmkj->bij", along_axes, stiff, along_axes), -slope[..., None])[
+                ..., 0
+            ]
             share = np.ones(count)
             for _ in range(40):
                 worse = parts(q + share[:, None] * step)[2] > energy + 1e-4 * share * np.sum(
@@ -232,19 +234,19 @@ def blocks(table: Table, count: int) -> Blocks:
     xx, yy, zz = (si(v) for v in block["inertia"])
     xy, xz, yz = (si(v) for v in block.get("inertia_products", [0.0, 0.0, 0.0]))
     mass[3:, 3:] = [[xx - si(block.get("turning_inertia", 0.0)), xy, xz], [xy, yy, yz], [xz, yz, zz]]
-    names = [told.get("name", f"mount {k + 1}") for k, told in enumerate(mounts["places"])]
+    names = [entry.get("name", f"mount {k + 1}") for k, entry in enumerate(mounts["places"])]
     defaults = {key: mounts[key] for key in KEYS if key in mounts}
-    found: dict[str, Any] = {key: [] for key in ("at", "axes", "stiff", "loss", "damping", "place")}
+    columns: dict[str, Any] = {key: [] for key in ("at", "axes", "stiff", "loss", "damping", "place")}
     tracks, stops, wholes = [], [], []
-    for k, told in enumerate(mounts["places"]):
-        mirrored = "mirror_of" in told
-        if "like" in told or mirrored:
-            leader = wholes[names.index(told.get("like", told.get("mirror_of")))]
-            told = {**({key: v for key, v in leader.items() if mirrored or key in KEYS}), **told}
-        wholes.append(told)
-        whole = {**defaults, **told}
+    for k, entry in enumerate(mounts["places"]):
+        mirrored = "mirror_of" in entry
+        if "like" in entry or mirrored:
+            leader = wholes[names.index(entry.get("like", entry.get("mirror_of")))]
+            entry = {**({key: v for key, v in leader.items() if mirrored or key in KEYS}), **entry}
+        wholes.append(entry)
+        whole = {**defaults, **entry}
         to = names.index(whole["joined_to"]) if "joined_to" in whole else k
-        at = found["at"][to] if to != k else numbers(whole["position"], count)
+        at = columns["at"][to] if to != k else numbers(whole["position"], count)
         axes = (
             rotation(np.radians(numbers(whole["turned"], count)))
             if "turned" in whole
@@ -254,12 +256,12 @@ def blocks(table: Table, count: int) -> Blocks:
             at, axes = at @ MIRROR, MIRROR @ axes @ MIRROR
         stiff = numbers(whole["stiffness"], count)
         after = numbers(whole.get("damping_per_stiffness", 0.0), count)
-        found["at"].append(at)
-        found["axes"].append(axes)
-        found["stiff"].append(stiff)
-        found["loss"].append(numbers(whole.get("loss_factor", 0.0), count)[:, None] * stiff)
-        found["damping"].append(numbers(whole.get("damping", [0.0] * 3), count) + after[:, None] * stiff)
-        found["place"].append(to)
+        columns["at"].append(at)
+        columns["axes"].append(axes)
+        columns["stiff"].append(stiff)
+        columns["loss"].append(numbers(whole.get("loss_factor", 0.0), count)[:, None] * stiff)
+        columns["damping"].append(numbers(whole.get("damping", [0.0] * 3), count) + after[:, None] * stiff)
+        columns["place"].append(to)
         stop = whole.get("stop")
         stops.append((si(stop["gap"]), si(stop["stiffness"])) if stop else (1e9, 0.0))
         if "fluid_track" in whole:
@@ -267,7 +269,7 @@ def blocks(table: Table, count: int) -> Blocks:
             fluid = tuple(si(f.get(key, 0.0)) for key in ("mass", "bulge_stiffness", "chamber_stiffness", "damping"))
             tracks.append((k, "xyz".index(f["axis"]), fluid))
     at, axes, stiff, loss, damping = (
-        np.stack(found[key], axis=1) for key in ("at", "axes", "stiff", "loss", "damping")
+        np.stack(columns[key], axis=1) for key in ("at", "axes", "stiff", "loss", "damping")
     )
     moves = np.concatenate([np.broadcast_to(np.eye(3), axes.shape), -crossed(at - centre)], axis=-1)
-    return Blocks(mass, centre, moves, axes, stiff, loss, damping, tracks, np.array(stops), found["place"])  # type: ignore[arg-type]
+    return Blocks(mass, centre, moves, axes, stiff, loss, damping, tracks, np.array(stops), columns["place"])  # type: ignore[arg-type]

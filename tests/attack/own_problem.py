@@ -42,30 +42,30 @@ class Weight:
     x: float
     place: complex
     ratio: float
-    told: Table
+    entry: Table
     turned: float
     role: str
     follows: tuple[str, float, bool] | None = None
 
 
-def is_open(told: Any) -> bool:
-    return isinstance(told, dict) and "between" in told
+def is_open(entry: Any) -> bool:
+    return isinstance(entry, dict) and "between" in entry
 
 
-def opened(table: Table) -> list[Open]:
+def open_numbers_of(table: Table) -> list[Open]:
     """Open numbers of mounts, counterweights and balancer shafts."""
-    found: list[Open] = []
+    rows: list[Open] = []
 
-    def look(told: Any, path: tuple[Any, ...], name: str) -> None:
-        if is_open(told):
-            low, high = (si(v) for v in told["between"])
+    def look(entry: Any, path: tuple[Any, ...], name: str) -> None:
+        if is_open(entry):
+            low, high = (si(v) for v in entry["between"])
             nearest = min(max(0.0, low), high)
-            found.append(Open(name, path, low, high, si(told["start"]) if "start" in told else nearest))
-        elif isinstance(told, dict):
-            for key, part in told.items():
+            rows.append(Open(name, path, low, high, si(entry["start"]) if "start" in entry else nearest))
+        elif isinstance(entry, dict):
+            for key, part in entry.items():
                 look(part, (*path, key), f"{name}.{key}")
-        elif isinstance(told, list):
-            for k, part in enumerate(told):
+        elif isinstance(entry, list):
+            for k, part in enumerate(entry):
                 look(part, (*path, k), f"{name}.{'xyz'[k]}" if k < 3 else name)
 
     for key in ("counterweights", "balancer_shafts"):
@@ -82,10 +82,10 @@ def opened(table: Table) -> list[Open]:
     for key, part in table["mounts"].items():
         if key != "places":
             look(part, ("mounts", key), f"mounts.{key}")
-    return found
+    return rows
 
 
-class Own:
+class OwnModel:
     """Objective and limits of designs X (count, open numbers).
 
     Parameters
@@ -100,7 +100,7 @@ class Own:
 
     def __init__(self, table: Table, samples: int = 4096, share: float = 0.0) -> None:
         self.table, self.samples, self.share = table, samples, share
-        self.open = opened(table)
+        self.open = open_numbers_of(table)
         self.turns = own_loads.turns_of(table["engine"])
         self.points: list[Table] = list(table["operating_points"])
         self.speeds = [si(p["speed"]) for p in self.points]
@@ -111,49 +111,49 @@ class Own:
         return np.array([(o.low, o.high) for o in self.open]).reshape(-1, 2)
 
     @property
-    def given(self) -> np.ndarray:
+    def start(self) -> np.ndarray:
         return np.array([o.start for o in self.open])
 
     # --- loads
 
     @cached_property
     def weights(self) -> list[Weight]:
-        found = []
+        rows = []
         engine = self.table["engine"]
         throws = [math.radians(float(t)) for t in engine["throws"]]
         radius = self.cylinders[0].radius
-        for told in self.table.get("counterweights", []):
-            if "balance_factor" in told:
-                for k in told.get("throws", range(1, len(throws) + 1)):
+        for entry in self.table.get("counterweights", []):
+            if "balance_factor" in entry:
+                for k in entry.get("throws", range(1, len(throws) + 1)):
                     x, throw, turning = self.pins[k - 1]
-                    rest = {**told, "turning": turning, "shares": si(engine["reciprocating_mass"]) * radius}
-                    found.append(Weight(f"{told['name']} {k}", x, 0j, 1.0, rest, throw + math.pi, "c"))
+                    rest = {**entry, "turning": turning, "shares": si(engine["reciprocating_mass"]) * radius}
+                    rows.append(Weight(f"{entry['name']} {k}", x, 0j, 1.0, rest, throw + math.pi, "c"))
                 continue
-            x, turned = told.get("x"), 0.0
-            if "opposite_throw" in told:
-                x, turned, _ = self.pins[told["opposite_throw"] - 1]
+            x, turned = entry.get("x"), 0.0
+            if "opposite_throw" in entry:
+                x, turned, _ = self.pins[entry["opposite_throw"] - 1]
                 turned += math.pi
-            found.append(Weight(told["name"], si(x), 0j, 1.0, told, turned, "c"))
+            rows.append(Weight(entry["name"], si(x), 0j, 1.0, entry, turned, "c"))
         for shaft in self.table.get("balancer_shafts", []):
             y, z = (si(v) for v in shaft["position"])
-            for j, told in enumerate(shaft["unbalances"]):
-                single = len(shaft["unbalances"]) == 1 and "name" not in told
-                name = shaft["name"] if single else f"{shaft['name']}.{told.get('name', j + 1)}"
-                how = told.get("coupled")
+            for j, entry in enumerate(shaft["unbalances"]):
+                single = len(shaft["unbalances"]) == 1 and "name" not in entry
+                name = shaft["name"] if single else f"{shaft['name']}.{entry.get('name', j + 1)}"
+                how = entry.get("coupled")
                 follows = (how["to"], SIGNS[how["as"]], how["as"].startswith("mirrored")) if how else None
-                found.append(
+                rows.append(
                     Weight(
                         name,
-                        si(told["x"]) if "x" in told else 0.0,
+                        si(entry["x"]) if "x" in entry else 0.0,
                         complex(z, y),
                         float(shaft["ratio"]),
-                        told,
+                        entry,
                         0.0,
                         "b",
                         follows,
                     )
                 )
-        return found
+        return rows
 
     @cached_property
     def inertia(self) -> np.ndarray:
@@ -184,7 +184,7 @@ class Own:
         return [own_loads.of_unbalance(w.x, w.place, w.ratio, self.turns, count) for w in self.weights]
 
     @cached_property
-    def felt(self) -> np.ndarray:
+    def harmonics(self) -> np.ndarray:
         """Harmonics of the cycle that count."""
         size = np.abs(self._fixed).max(axis=(0, 2))
         if self.share > 0.0:
@@ -195,30 +195,30 @@ class Own:
 
     def unbalances(self, table: Table, count: int) -> dict[str, np.ndarray]:
         """Complex (count,) of every weight."""
-        found: dict[str, np.ndarray] = {}
+        by_name: dict[str, np.ndarray] = {}
         for w in self.weights:
-            told = _at_names(table, w, self)
+            entry = _at_names(table, w, self)
             if w.follows:
                 name, sign, mirrored = w.follows
-                leader = found[name]
-                found[w.name] = sign * (leader.conj() if mirrored else leader)
+                leader = by_name[name]
+                by_name[w.name] = sign * (leader.conj() if mirrored else leader)
                 continue
-            if "balance_factor" in told:
-                size = told["turning"] + told["shares"] * _array(told["balance_factor"], count)
-            elif "unbalance" in told:
-                size = _array(told["unbalance"], count)
+            if "balance_factor" in entry:
+                size = entry["turning"] + entry["shares"] * _array(entry["balance_factor"], count)
+            elif "unbalance" in entry:
+                size = _array(entry["unbalance"], count)
             else:
-                size = _array(told["mass"], count) * si(told["radius"])
-            found[w.name] = size * np.exp(1j * (np.radians(_array(told.get("angle", 0.0), count)) + w.turned))
-        return found
+                size = _array(entry["mass"], count) * si(entry["radius"])
+            by_name[w.name] = size * np.exp(1j * (np.radians(_array(entry.get("angle", 0.0), count)) + w.turned))
+        return by_name
 
-    def wrenches(self, told: dict[str, np.ndarray], count: int) -> np.ndarray:
+    def wrenches(self, unbalances: dict[str, np.ndarray], count: int) -> np.ndarray:
         """(count, points, felt, 6)."""
-        out = np.broadcast_to(self._fixed[:, self.felt], (count, len(self.points), len(self.felt), 6)).copy()
+        out = np.broadcast_to(self._fixed[:, self.harmonics], (count, len(self.points), len(self.harmonics), 6)).copy()
         w2 = np.array(self.speeds) ** 2
         for w, (upright, aside) in zip(self.weights, self.of_weights, strict=True):
-            u = told[w.name]
-            unit = u.real[:, None, None] * upright[self.felt] + u.imag[:, None, None] * aside[self.felt]
+            u = unbalances[w.name]
+            unit = u.real[:, None, None] * upright[self.harmonics] + u.imag[:, None, None] * aside[self.harmonics]
             out += w2[:, None, None] * unit[:, None]
         return out
 
@@ -238,30 +238,30 @@ class Own:
         return Designs(self, np.atleast_2d(np.asarray(x, float)))
 
 
-def _array(told: Any, count: int) -> np.ndarray:
-    return told if isinstance(told, np.ndarray) else np.full(count, si(told))
+def _array(numbers: Any, count: int) -> np.ndarray:
+    return numbers if isinstance(numbers, np.ndarray) else np.full(count, si(numbers))
 
 
-def _at_names(table: Table, w: Weight, own: Own) -> Table:
+def _at_names(table: Table, w: Weight, model: OwnModel) -> Table:
     """Numbers of a weight with open ones put in."""
-    for told in table.get("counterweights", []):
-        if told["name"] == w.name or ("balance_factor" in told and w.name.startswith(told["name"] + " ")):
-            return {**told, **{k: w.told[k] for k in ("turning", "shares") if k in w.told}}
+    for entry in table.get("counterweights", []):
+        if entry["name"] == w.name or ("balance_factor" in entry and w.name.startswith(entry["name"] + " ")):
+            return {**entry, **{k: w.entry[k] for k in ("turning", "shares") if k in w.entry}}
     for shaft in table.get("balancer_shafts", []):
-        for j, told in enumerate(shaft["unbalances"]):
-            if w.name in (shaft["name"], f"{shaft['name']}.{told.get('name', j + 1)}"):
-                return dict(told)
+        for j, entry in enumerate(shaft["unbalances"]):
+            if w.name in (shaft["name"], f"{shaft['name']}.{entry.get('name', j + 1)}"):
+                return dict(entry)
     raise KeyError(w.name)
 
 
 class Designs:
     """Values of measures of many designs."""
 
-    def __init__(self, own: Own, x: np.ndarray) -> None:
-        self.own, self.x, self.count = own, x, len(x)
-        self.table = own.closed(x)
-        self.told = own.unbalances(self.table, self.count)
-        self.wrench = own.wrenches(self.told, self.count)
+    def __init__(self, model: OwnModel, x: np.ndarray) -> None:
+        self.model, self.x, self.count = model, x, len(x)
+        self.table = model.closed(x)
+        self.unbalances = model.unbalances(self.table, self.count)
+        self.wrench = model.wrenches(self.unbalances, self.count)
 
     @cached_property
     def blocks(self) -> Blocks:
@@ -270,57 +270,59 @@ class Designs:
     @cached_property
     def _answers(self) -> dict[str, np.ndarray]:
         """Coefficients (count, points, felt, mounts, 3)."""
-        orders = self.own.felt / self.own.turns
-        both = [self.blocks.answer(orders * w, self.wrench[:, p]) for p, w in enumerate(self.own.speeds)]
+        orders = self.model.harmonics / self.model.turns
+        both = [self.blocks.answer(orders * w, self.wrench[:, p]) for p, w in enumerate(self.model.speeds)]
         return {
             "mount force": np.stack([f for f, _ in both], axis=1),
             "mount travel": np.stack([t for _, t in both], axis=1),
         }
 
-    def coefficients(self, asked: Table, channel: str) -> np.ndarray:
+    def coefficients(self, term: Table, channel: str) -> np.ndarray:
         """(count, points that count, places, felt, components), and the weights of the points."""
-        keep = self._points(asked)
+        keep = self._points(term)
         if channel in ON_BLOCK:
-            found = self.wrench[:, keep][..., ON_BLOCK[channel]][:, :, None]
+            series = self.wrench[:, keep][..., ON_BLOCK[channel]][:, :, None]
         else:
-            at = [k for k in self._mounts(asked) if self.blocks.place[k] == k]
-            found = self._answers[channel][:, keep][:, :, :, at] * np.array(
-                asked.get("direction_weights", [1.0] * 3), float
+            at = [k for k in self._mounts(term) if self.blocks.place[k] == k]
+            series = self._answers[channel][:, keep][:, :, :, at] * np.array(
+                term.get("direction_weights", [1.0] * 3), float
             )
-            found = found.transpose(0, 1, 3, 2, 4)
-        return found * self._orders(asked)[:, None]
+            series = series.transpose(0, 1, 3, 2, 4)
+        return series * self._orders(term)[:, None]
 
-    def _orders(self, asked: Table) -> np.ndarray:
-        orders = self.own.felt / self.own.turns
-        told = asked.get("orders")
+    def _orders(self, term: Table) -> np.ndarray:
+        orders = self.model.harmonics / self.model.turns
+        listed = term.get("orders")
         return (
             np.ones(len(orders))
-            if told is None
-            else np.array([float(any(abs(o - t) < 1e-9 for t in told)) for o in orders])
+            if listed is None
+            else np.array([float(any(abs(o - t) < 1e-9 for t in listed)) for o in orders])
         )
 
-    def _points(self, asked: Table) -> list[int]:
-        told = asked.get("operating_points")
-        return [k for k, p in enumerate(self.own.points) if told is None or p["name"] in told]
+    def _points(self, term: Table) -> list[int]:
+        names = term.get("operating_points")
+        return [k for k, p in enumerate(self.model.points) if names is None or p["name"] in names]
 
-    def _mounts(self, asked: Table) -> list[int]:
+    def _mounts(self, term: Table) -> list[int]:
         names = [p.get("name", f"mount {k + 1}") for k, p in enumerate(self.table["mounts"]["places"])]
-        return [names.index(n) for n in asked.get("mounts", names)]
+        return [names.index(n) for n in term.get("mounts", names)]
 
     def samples(self, c: np.ndarray) -> np.ndarray:
         """(..., samples, components) of coefficients (..., felt, components)."""
-        n = self.own.samples
+        n = self.model.samples
         full = np.zeros((*c.shape[:-2], n // 2 + 1, c.shape[-1]), complex)
-        low = self.own.felt <= n // 2
-        full[..., self.own.felt[low], :] = c[..., low, :] * np.where(self.own.felt[low] == 0, 1.0, 0.5)[:, None]
+        low = self.model.harmonics <= n // 2
+        full[..., self.model.harmonics[low], :] = (
+            c[..., low, :] * np.where(self.model.harmonics[low] == 0, 1.0, 0.5)[:, None]
+        )
         return np.fft.irfft(full, n=n, axis=-2) * n
 
-    def norm(self, norm: str, asked: Table, channel: str) -> np.ndarray:
-        c = self.coefficients(asked, channel)
-        w = np.array([float(self.own.points[k].get("weight", 1.0)) for k in self._points(asked)])
+    def norm(self, norm: str, term: Table, channel: str) -> np.ndarray:
+        c = self.coefficients(term, channel)
+        w = np.array([float(self.model.points[k].get("weight", 1.0)) for k in self._points(term)])
         share = w / w.sum()
         if norm == "rms":
-            half = np.where(self.own.felt == 0, 1.0, 0.5)
+            half = np.where(self.model.harmonics == 0, 1.0, 0.5)
             return np.sqrt((np.sum(np.abs(c) ** 2, axis=-1) @ half).mean(axis=2) @ share)
         v = self.samples(c)
         if norm == "peak to peak":
@@ -339,9 +341,9 @@ class Designs:
 
     def _largest(self, c: np.ndarray, length: np.ndarray) -> np.ndarray:
         """Largest length, sought between the samples by Newton's method."""
-        if self.own.share > 0.0:
+        if self.model.share > 0.0:
             return length.max(axis=(1, 2, 3))
-        n, h = length.shape[-1], 1j * self.own.felt
+        n, h = length.shape[-1], 1j * self.model.harmonics
         at = 2.0 * np.pi * length.argmax(axis=-1) / n
         best = length.max(axis=-1)
         for _ in range(4):
@@ -352,43 +354,43 @@ class Designs:
             at = at - np.clip(np.where(bend < 0.0, slope / np.where(bend < 0.0, bend, 1.0), 0.0), -4.0 / n, 4.0 / n)
         return best.max(axis=(1, 2))
 
-    def measure(self, asked: Table) -> np.ndarray:
+    def measure(self, term: Table) -> np.ndarray:
         """(count,) of an objective's term or a limit's quantity."""
-        norm, channel = norm_and_channel(asked["quantity"])
+        norm, channel = norm_and_channel(term["quantity"])
         if norm:
-            return self.norm(norm, asked, channel)
+            return self.norm(norm, term, channel)
         if channel in own_runs.MEASURES:
             return self._runs[channel]
         if channel == "transmissibility":
-            return self._transmissibility(asked)
+            return self._transmissibility(term)
         if channel.endswith("mass"):
-            return self._mass(asked, channel)
+            return self._mass(term, channel)
         if channel in ("static travel", "static mount force"):
-            return self._static(asked, channel)
+            return self._static(term, channel)
         b = self.blocks
         if channel in ("kinetic-energy decoupling", "decoupling shortfall"):
-            shares = b.modes[1].max(axis=2)[:, [MOTIONS.index(m) for m in asked.get("motions", MOTIONS)]]
+            shares = b.modes[1].max(axis=2)[:, [MOTIONS.index(m) for m in term.get("motions", MOTIONS)]]
             if channel == "kinetic-energy decoupling":
                 return shares.min(axis=1)
-            return np.maximum(float(asked.get("wanted", 1.0)) - shares, 0.0).sum(axis=1)
+            return np.maximum(float(term.get("wanted", 1.0)) - shares, 0.0).sum(axis=1)
         if channel == "motion frequencies":
             frequencies, shares = b.modes
-            dominant = shares.argmax(axis=2)[:, [MOTIONS.index(m) for m in asked.get("motions", MOTIONS)]]
+            dominant = shares.argmax(axis=2)[:, [MOTIONS.index(m) for m in term.get("motions", MOTIONS)]]
             return np.take_along_axis(frequencies, dominant, axis=1).max(axis=1)
         if channel == "static sag":
             return b.sag
         if channel == "total stiffness":
             return b.stiff.sum(axis=(1, 2))
         if channel == "torque-roll residual":
-            return b.torque_roll(si(asked["frequency"]))
+            return b.torque_roll(si(term["frequency"]))
         assert channel == "raw torque-roll residual", channel
-        told = asked.get("frequency")
+        edges = term.get("frequency")
         band = (
             (0.0, np.inf)
-            if told is None
-            else tuple(si(v) for v in told["between"])
-            if is_open(told)
-            else (si(told),) * 2
+            if edges is None
+            else tuple(si(v) for v in edges["between"])
+            if is_open(edges)
+            else (si(edges),) * 2
         )
         return b.raw_torque_roll(band)
 
@@ -396,30 +398,30 @@ class Designs:
     def _runs(self) -> dict[str, np.ndarray]:
         return own_runs.run_through(self)
 
-    def _transmissibility(self, asked: Table) -> np.ndarray:
-        keep = (self.own.felt > 0) & (self._orders(asked) > 0)
-        found = []
-        for p in self._points(asked):
+    def _transmissibility(self, term: Table) -> np.ndarray:
+        keep = (self.model.harmonics > 0) & (self._orders(term) > 0)
+        rows = []
+        for p in self._points(term):
             passed = np.sum(np.abs(self._answers["mount force"][:, p, keep]) ** 2, axis=(1, 2, 3))
-            found.append(
+            rows.append(
                 np.sqrt(passed / np.sum(np.abs(self.blocks.firm(self.wrench[:, p, keep])) ** 2, axis=(1, 2, 3)))
             )
-        return np.max(found, axis=0)
+        return np.max(rows, axis=0)
 
-    def _mass(self, asked: Table, channel: str) -> np.ndarray:
+    def _mass(self, term: Table, channel: str) -> np.ndarray:
         role = {"counterweight mass": "c", "balancer mass": "b", "added mass": "cb"}[channel]
         total = np.zeros(self.count)
-        for w in self.own.weights:
-            if w.role in role and ("of" not in asked or w.name in asked["of"]):
-                leader = w if w.follows is None else next(v for v in self.own.weights if v.name == w.follows[0])
-                total += np.abs(self.told[w.name]) / si(w.told.get("radius", leader.told.get("radius")))
+        for w in self.model.weights:
+            if w.role in role and ("of" not in term or w.name in term["of"]):
+                leader = w if w.follows is None else next(v for v in self.model.weights if v.name == w.follows[0])
+                total += np.abs(self.unbalances[w.name]) / si(w.entry.get("radius", leader.entry.get("radius")))
         return total
 
-    def _static(self, asked: Table, channel: str) -> np.ndarray:
-        found, at = [], self._mounts(asked)
-        weigh = np.array(asked.get("direction_weights", [1.0] * 3), float)
+    def _static(self, term: Table, channel: str) -> np.ndarray:
+        rows, at = [], self._mounts(term)
+        weigh = np.array(term.get("direction_weights", [1.0] * 3), float)
         for case in self.table["load_cases"]:
-            if case["name"] not in asked.get("load_cases", [case["name"]]):
+            if case["name"] not in term.get("load_cases", [case["name"]]):
                 continue
             load = np.zeros(6)
             load[:3] += (
@@ -430,35 +432,35 @@ class Designs:
                 force = np.array([si(v) for v in case["force"]])
                 at_place = np.array([si(v) for v in case["place"]]) - self.blocks.centre
                 load += np.concatenate([force, np.cross(at_place, force)])
-            travel, force = self.blocks.held(load)
-            found.append(
+            travel, force = self.blocks.static_answer(load)
+            rows.append(
                 np.linalg.norm((travel if channel == "static travel" else force)[:, at] * weigh, axis=-1).max(axis=1)
             )
-        return np.max(found, axis=0)
+        return np.max(rows, axis=0)
 
     @cached_property
     def objective(self) -> np.ndarray:
-        told = self.table["objective"]
-        terms = told["terms"] if "terms" in told else [{**told, "quantity": told["minimise"]}]
-        weights = [float(t.get("weight", 1.0)) if "terms" in told else 1.0 for t in terms]
+        objective = self.table["objective"]
+        terms = objective["terms"] if "terms" in objective else [{**objective, "quantity": objective["minimise"]}]
+        weights = [float(t.get("weight", 1.0)) if "terms" in objective else 1.0 for t in terms]
         return sum(w * self.measure(t) for w, t in zip(weights, terms, strict=True))  # type: ignore[return-value]
 
     def violation(self, limit: Table) -> np.ndarray:
         """Share of itself by which a limit is broken; not over nought where it is kept."""
-        found = []
+        rows = []
         if limit["limit"] == "natural frequencies":
             f = self.blocks.modes[0]
             high, low = f.max(axis=1), f.min(axis=1)
             if "outside" in limit:
                 a, b = (si(v) for v in limit["outside"])
-                found.append(np.minimum(f - a, b - f).max(axis=1) / b)
+                rows.append(np.minimum(f - a, b - f).max(axis=1) / b)
         else:
             high = low = self.measure({**limit, "quantity": limit["limit"]})
         if "max" in limit:
-            found.append(high / si(limit["max"]) - 1.0)
+            rows.append(high / si(limit["max"]) - 1.0)
         if "min" in limit:
-            found.append(1.0 - low / si(limit["min"]))
-        return np.max(found, axis=0)
+            rows.append(1.0 - low / si(limit["min"]))
+        return np.max(rows, axis=0)
 
     @cached_property
     def excesses(self) -> np.ndarray:

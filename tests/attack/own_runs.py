@@ -34,23 +34,25 @@ def matrices(designs: Designs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def run_through(designs: Designs) -> dict[str, np.ndarray]:
     """Largest of up and down, (count,) each."""
-    told: Table = designs.table["run_up"]
-    top, own = si(told["up_to"]), designs.own
-    found = {key: np.zeros(designs.count) for key in MEASURES}
-    point = min(own.points, key=lambda p: si(p["speed"]))
-    if "operating_point" in told:
-        point = next(p for p in own.points if p["name"] == told["operating_point"])
-    kept = own.felt[own.felt <= ORDERS * own.turns]
-    inertia = np.broadcast_to(own.inertia[kept], (designs.count, len(kept), 6)).copy()
-    for w, (upright, aside) in zip(own.weights, own.of_weights, strict=True):
-        u = designs.told[w.name][:, None, None]
-        inertia += u.real * upright[kept] + u.imag * aside[kept]
-    both = [designs.blocks.about_centre(load) for load in (inertia, own.gas(point)[kept][None])]
-    times = (si(told.get("time", 3.0)), si(told.get("shut_down_time", told.get("time", 3.0))))
+    run_up: Table = designs.table["run_up"]
+    top, model = si(run_up["up_to"]), designs.model
+    peaks = {key: np.zeros(designs.count) for key in MEASURES}
+    point = min(model.points, key=lambda p: si(p["speed"]))
+    if "operating_point" in run_up:
+        point = next(p for p in model.points if p["name"] == run_up["operating_point"])
+    orders = model.harmonics[model.harmonics <= ORDERS * model.turns]
+    inertia = np.broadcast_to(model.inertia[orders], (designs.count, len(orders), 6)).copy()
+    for w, (upright, aside) in zip(model.weights, model.of_weights, strict=True):
+        u = designs.unbalances[w.name][:, None, None]
+        inertia += u.real * upright[orders] + u.imag * aside[orders]
+    both = [designs.blocks.about_centre(load) for load in (inertia, model.gas(point)[orders][None])]
+    times = (si(run_up.get("time", 3.0)), si(run_up.get("shut_down_time", run_up.get("time", 3.0))))
     for first, last, duration in ((0.0, top, times[0]), (top, 0.0, times[1])):
-        for key, value in _one(designs, both, kept / own.turns, (first, (last - first) / duration, duration)).items():
-            found[key] = np.maximum(found[key], value)
-    return found
+        for key, value in _one(
+            designs, both, orders / model.turns, (first, (last - first) / duration, duration)
+        ).items():
+            peaks[key] = np.maximum(peaks[key], value)
+    return peaks
 
 
 def _one(
@@ -75,7 +77,7 @@ def _one(
 
     y, now = np.zeros((designs.count, 12)), push(0.0)
     maximum = {key: np.zeros(designs.count) for key in MEASURES}
-    held: list[np.ndarray] = []
+    states: list[np.ndarray] = []
     for step in range(count):
         middle, after = push((step + 0.5) * dt), push((step + 1.0) * dt)
         a = (rates @ y[..., None])[..., 0] + now
@@ -83,10 +85,10 @@ def _one(
         d = (rates @ (y + 0.5 * dt * b)[..., None])[..., 0] + middle
         e = (rates @ (y + dt * d)[..., None])[..., 0] + after
         y, now = y + dt / 6.0 * (a + 2.0 * b + 2.0 * d + e), after
-        held.append(y)
-        if len(held) == 256 or step == count - 1:
-            _read(maximum, np.array(held), by_motion, by_speed, designs)
-            held = []
+        states.append(y)
+        if len(states) == 256 or step == count - 1:
+            _read(maximum, np.array(states), by_motion, by_speed, designs)
+            states = []
     return maximum
 
 

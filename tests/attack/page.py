@@ -94,8 +94,8 @@ def entries_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
 
 def lines_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
     """Every problem of the logs, the last entry of each."""
-    found = {(line["family"], line["seed"]): line for line in entries_of(logs)}
-    return list(found.values())
+    latest = {(line["family"], line["seed"]): line for line in entries_of(logs)}
+    return list(latest.values())
 
 
 def mended(logs: Iterable[Path]) -> list[dict[str, Any]]:
@@ -109,22 +109,22 @@ def table_of(lines: list[dict[str, Any]]) -> list[str]:
     """What was wrong, a line each."""
     if not lines:
         return ["Nothing."]
-    told = [re.sub(r"\S*/attack-\w+/", "", "; ".join(line["wrong"]))[:300] for line in lines]
-    rows = [f"| {line['family']} | {line['seed']} | {text} |" for line, text in zip(lines, told, strict=True)]
+    faults = [re.sub(r"\S*/attack-\w+/", "", "; ".join(line["wrong"]))[:300] for line in lines]
+    rows = [f"| {line['family']} | {line['seed']} | {text} |" for line, text in zip(lines, faults, strict=True)]
     return ["| family | seed | what |", "| --- | ---: | --- |", *rows]
 
 
 def row(name: str, lines: list[dict[str, Any]]) -> str:
     """One kind of problem, or one variation of a kind."""
     status = Counter(line["kind"] or line["status"] for line in lines)
-    told = ", ".join(f"{count} {kind}" for kind, count in status.most_common())
+    text = ", ".join(f"{count} {kind}" for kind, count in status.most_common())
     wrong = sum(bool(line["wrong"]) for line in lines)
     beaten = sum(line["beaten"] > 1e-3 for line in lines)
     noted = sum(bool(line.get("notes")) for line in lines)
     seconds = sum(line["seconds"] for line in lines) / len(lines)
     extra = f"{beaten} beaten" if beaten else ""
     extra += f"{noted} noted" if noted else ""
-    return f"| {name} | {len(lines)} | {told} | {wrong} | {extra} | {seconds:.1f} |"
+    return f"| {name} | {len(lines)} | {text} | {wrong} | {extra} | {seconds:.1f} |"
 
 
 def family_row(family: str, lines: list[dict[str, Any]]) -> str:

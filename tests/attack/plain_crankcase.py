@@ -52,26 +52,26 @@ def signal(scene: Any, machine: Machine, channel: str, orders: list[float] | Non
 def irregularity(scene: Any, machine: Machine, weights: np.ndarray) -> float:
     """The most of all points that count."""
     if "flywheel" in scene.table:
-        own = number(scene.table["flywheel"]["inertia"])
+        inertia = number(scene.table["flywheel"]["inertia"])
     else:
-        told = scene.table["torsion"]
-        own = number(told["discs"][0]["inertia"])
-        own += sum(number(told["throw_inertia"]) + m.pin_mass * m.radius**2 for m in machine.mechanisms)
-    return max(_uneven(scene, machine, k, own) for k in range(len(scene.points)) if weights[k] > 0.0)
+        keys = scene.table["torsion"]
+        inertia = number(keys["discs"][0]["inertia"])
+        inertia += sum(number(keys["throw_inertia"]) + m.pin_mass * m.radius**2 for m in machine.mechanisms)
+    return max(_uneven(scene, machine, k, inertia) for k in range(len(scene.points)) if weights[k] > 0.0)
 
 
 def at(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
     speed, gas = scene.speeds[k], gas_at(scene, k)
     if channel in FORCES:
         pins = np.array([on_pin(m, machine.turns, speed, gas) for m in machine.mechanisms])
-        found = pins if channel == "crank-pin force" else _on_bearings(scene, machine, pins, speed)
-        return np.stack([found.imag, found.real], axis=-1)
+        signal = pins if channel == "crank-pin force" else _on_bearings(scene, machine, pins, speed)
+        return np.stack([signal.imag, signal.real], axis=-1)
     torques = [torque_of(m, machine.turns, speed, gas) for m in machine.mechanisms]
     if channel == "shaft twist":
         return _twist(scene, machine, torques, speed)
     total = np.sum(torques, axis=0)
-    found = total if channel == "crank torque" else _integral(total - total.mean(), machine.turns)
-    return found[None, :, None]
+    signal = total if channel == "crank torque" else _integral(total - total.mean(), machine.turns)
+    return signal[None, :, None]
 
 
 def gas_at(scene: Any, k: int) -> dict[str, Any] | None:
@@ -107,8 +107,8 @@ def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarra
 @lru_cache(maxsize=64)
 def _over_crankcase(m: Mechanism, turns: int, gas: str) -> np.ndarray:
     """Pressure over that of the crankcase, on a fine grid from firing: the same wherever the throw stands."""
-    told = json.loads(gas)
-    return seiliger(told, m, turns) - number(told.get("crankcase_pressure", ATMOSPHERE))
+    gas_keys = json.loads(gas)
+    return seiliger(gas_keys, m, turns) - number(gas_keys.get("crankcase_pressure", ATMOSPHERE))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -124,8 +124,8 @@ def _pushed(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) 
     lost = m.piston_mass * speed**2 * slope(slope(end, turns), turns)
     moment, total = _cross(end - base, lost - pressing), lost - pressing
     for share, mass in shank_of(m):
-        own = mass * speed**2 * slope(slope(base + share * (end - base), turns), turns)
-        moment, total = moment + _cross(share * (end - base), own), total + own
+        force = mass * speed**2 * slope(slope(base + share * (end - base), turns), turns)
+        moment, total = moment + _cross(share * (end - base), force), total + force
     wall = moment / _cross(end - base, 1j * axis * np.ones(len(base)))
     return wall, wall * 1j * axis - total
 
@@ -190,10 +190,10 @@ def _integral(torque: np.ndarray, turns: int) -> np.ndarray:
     return np.fft.irfft(np.where(k > 0.0, c / (1j * np.where(k > 0.0, k, 1.0)), 0.0), len(torque))
 
 
-def _uneven(scene: Any, machine: Machine, k: int, own: float) -> float:
+def _uneven(scene: Any, machine: Machine, k: int, wheel: float) -> float:
     """From the energy of all that moves, whose mean speed over time is the one given."""
     speed, gas, turns = scene.speeds[k], gas_at(scene, k), machine.turns
-    inertia, torque = np.full(SAMPLES, own), np.zeros(SAMPLES)
+    inertia, torque = np.full(SAMPLES, wheel), np.zeros(SAMPLES)
     for m in machine.mechanisms:
         if m.shape is not None:
             inertia += m.shape.inertia / 9.0
@@ -215,20 +215,20 @@ def _uneven(scene: Any, machine: Machine, k: int, own: float) -> float:
 
 def _twist(scene: Any, machine: Machine, torques: list[np.ndarray], speed: float) -> np.ndarray:
     """Angle of each disc before the next one, from the front, shape (sections, samples, 1)."""
-    told, turns = scene.table["torsion"], machine.turns
-    stiff = [number(told["crank"]["stiffness"])] * (len(torques) - 1) + [number(told["discs"][0]["shaft"]["stiffness"])]
-    damping, loss = number(told["cylinder_damping"]), told["loss_factor"]
+    keys, turns = scene.table["torsion"], machine.turns
+    stiff = [number(keys["crank"]["stiffness"])] * (len(torques) - 1) + [number(keys["discs"][0]["shaft"]["stiffness"])]
+    damping, loss = number(keys["cylinder_damping"]), keys["loss_factor"]
     # cylinders are listed from the front; what turns beside their rods is at the crank radius
     discs = []
     for m in machine.mechanisms:
         swinging = m.piston_mass * float(np.mean(np.abs(slope(_moving(m, turns)[1], turns)) ** 2))
-        discs.append(number(told["throw_inertia"]) + m.pin_mass * m.radius**2 + swinging)
-    inertia = np.array([*discs, number(told["discs"][0]["inertia"])])
+        discs.append(number(keys["throw_inertia"]) + m.pin_mass * m.radius**2 + swinging)
+    inertia = np.array([*discs, number(keys["discs"][0]["inertia"])])
     size = len(inertia)
     links = np.zeros((size, size), complex)
-    for k, own in enumerate(stiff):
-        links[[k, k + 1], [k, k + 1]] += own * (1.0 + 1j * loss)
-        links[[k, k + 1], [k + 1, k]] -= own * (1.0 + 1j * loss)
+    for k, stiffness in enumerate(stiff):
+        links[[k, k + 1], [k, k + 1]] += stiffness * (1.0 + 1j * loss)
+        links[[k, k + 1], [k + 1, k]] -= stiffness * (1.0 + 1j * loss)
     drives = np.array([np.fft.rfft(t) / SAMPLES for t in torques])
     out = np.zeros((len(stiff), drives.shape[1]), complex)
     through = np.cumsum(drives[:, 0].real)

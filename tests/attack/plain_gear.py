@@ -37,8 +37,8 @@ def part(table: dict[str, Any], name: str) -> dict[str, float]:
 
 def end(table: dict[str, Any]) -> tuple[float, float]:
     """Diameter and width of the crank pins."""
-    told = table["engine"]["big_end"]
-    return number(told["diameter"]), number(told["width"])
+    entry = table["engine"]["big_end"]
+    return number(entry["diameter"]), number(entry["width"])
 
 
 def weighed(table: dict[str, Any]) -> dict[str, Any]:
@@ -69,22 +69,22 @@ def mass(table: dict[str, Any], machine: Machine) -> float:
     journal = min(number(b["diameter"]) for b in table["main_bearings"])
     throw = disc(across) * width
     throw += 2.0 * webs["width"] * webs["thickness"] * (radius + 0.5 * across + 0.5 * journal)
-    told = weighed(table)
-    return len(machine.mechanisms) * (density * throw + told["shank"] + told["at_piston"])
+    parts = weighed(table)
+    return len(machine.mechanisms) * (density * throw + parts["shank"] + parts["at_piston"])
 
 
 def clearance(table: dict[str, Any], machine: Machine) -> float:
     """What pin, web and half of a journal leave between the middles of pin and bearing."""
     thickness, (_, width) = part(table, "webs")["thickness"], end(table)
-    found = []
+    distances = []
     for m in machine.mechanisms:
-        for bearing in _beside(table, m):
+        for bearing in _neighbours(table, m):
             room = abs(number(bearing["x"]) - m.x) - 0.5 * width - 0.5 * number(bearing["width"])
-            found.append(room - thickness)
-    return min(found)
+            distances.append(room - thickness)
+    return min(distances)
 
 
-def _beside(table: dict[str, Any], m: Mechanism) -> tuple[dict[str, Any], dict[str, Any]]:
+def _neighbours(table: dict[str, Any], m: Mechanism) -> tuple[dict[str, Any], dict[str, Any]]:
     """The bearings before a throw and behind it."""
     ahead = [b for b in table["main_bearings"] if number(b["x"]) > m.x]
     behind = [b for b in table["main_bearings"] if number(b["x"]) < m.x]
@@ -105,23 +105,23 @@ def stress(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
     if channel in ("rod stress", "share of the buckling load", "piston-pin bending stress"):
         pressed = [plain_crankcase.pressing_rod(m, machine.turns, speed, gas) for m in machine.mechanisms]
         return np.array([np.stack([p.real, p.imag], axis=-1) for p in pressed]) * _rod_factor(table, channel)
-    found = []
+    forces = []
     for m in machine.mechanisms:
-        front, rear = _beside(table, m)
+        front, rear = _neighbours(table, m)
         a, b = number(front["x"]), number(rear["x"])
         inside = [(x, f) for x, f in _loads(scene, machine, speed, gas) if b < x < a]
         if channel == "crank-pin bending stress":
             shares = [(a - x) * (m.x - b) if x >= m.x else (x - b) * (a - m.x) for x, _ in inside]
             moment = sum(s / (a - b) * f for s, (_, f) in zip(shares, inside, strict=True))
-            found.append(moment / modulus(across))
+            forces.append(moment / modulus(across))
             continue
         webs = part(table, "webs")
         for support, far in ((a, b), (b, a)):
             carried = sum((far - x) / (far - support) * f for x, f in inside)
             lever = max(abs(support - m.x) - 0.5 * width - 0.5 * webs["thickness"], 0.0)
             bent = lever / (webs["width"] * webs["thickness"] ** 2 / 6.0)
-            found.append(carried * (bent + 1.0 / (webs["width"] * webs["thickness"])))
-    return np.array([np.stack([own.imag, own.real], axis=-1) for own in found])
+            forces.append(carried * (bent + 1.0 / (webs["width"] * webs["thickness"])))
+    return np.array([np.stack([force.imag, force.real], axis=-1) for force in forces])
 
 
 def _loads(scene: Any, machine: Machine, speed: float, gas: dict[str, Any] | None) -> list[tuple[float, np.ndarray]]:
@@ -133,11 +133,11 @@ def _loads(scene: Any, machine: Machine, speed: float, gas: dict[str, Any] | Non
 def _torsion(table: dict[str, Any], machine: Machine, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
     """Of all throws before each journal."""
     torques = [(m.x, plain_crankcase.torque_of(m, machine.turns, speed, gas)) for m in machine.mechanisms]
-    found = []
+    rows = []
     for bearing in table["main_bearings"]:
         through = sum((t for x, t in torques if x > number(bearing["x"])), np.zeros(len(torques[0][1])))
-        found.append(through / (2.0 * modulus(number(bearing["diameter"]))))
-    return np.array(found)[:, :, None]
+        rows.append(through / (2.0 * modulus(number(bearing["diameter"]))))
+    return np.array(rows)[:, :, None]
 
 
 def _rod_factor(table: dict[str, Any], channel: str) -> float:

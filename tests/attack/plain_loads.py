@@ -158,14 +158,15 @@ def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
     return out
 
 
-def lever_masses(m: Mechanism, own: Lever, base: np.ndarray) -> tuple[list[tuple[float, np.ndarray]], np.ndarray]:
+def lever_masses(m: Mechanism, lever: Lever, base: np.ndarray) -> tuple[list[tuple[float, np.ndarray]], np.ndarray]:
     """Ram, lever and its weight with their places, and the angle of the lever, of a crank pin at `base`."""
     axis = np.exp(1j * m.bank)
-    angle = np.unwrap(np.angle(base / axis + 1j * own.pivot))
-    along, pivot = np.exp(1j * angle), -1j * own.pivot
-    ram = own.length * np.cos(angle) + 1j * own.height
+    angle = np.unwrap(np.angle(base / axis + 1j * lever.pivot))
+    along, pivot = np.exp(1j * angle), -1j * lever.pivot
+    ram = lever.length * np.cos(angle) + 1j * lever.height
     places = [
-        (m.piston_mass, ram), (own.mass, pivot + own.centre * along), (own.weight, pivot - own.weight_radius * along)
+        (m.piston_mass, ram), (lever.mass, pivot + lever.centre * along),
+        (lever.weight, pivot - lever.weight_radius * along),
     ]  # fmt: skip
     return [(mass, axis * place) for mass, place in places], angle
 
@@ -226,8 +227,8 @@ def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, who
         mean = 0.5 * (pressure(cut_off) + np.roll(pressure(cut_off), -1))
         return float(np.sum(mean * (np.roll(v, -1) - v)))
 
-    found = brentq(lambda c: imep(c) - wanted, 1.0, e, xtol=1e-12)
-    return pressure(found)
+    cut_off = brentq(lambda c: imep(c) - wanted, 1.0, e, xtol=1e-12)
+    return pressure(cut_off)
 
 
 def unfired(gas: dict[str, Any], valves: str, m: Mechanism, turns: int) -> np.ndarray:
@@ -296,11 +297,11 @@ def shared_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
     return np.fft.rfft(area * over * slope(v.astype(complex), turns).real)[: SAMPLES // 2 + 1] / FINE
 
 
-def chamber_pressure(told: dict[str, Any], x: np.ndarray, grows: np.ndarray) -> np.ndarray:
+def chamber_pressure(entry: dict[str, Any], x: np.ndarray, grows: np.ndarray) -> np.ndarray:
     """Absolute pressure over the part of the stroke from where a chamber is smallest."""
-    if "pump" in told:
-        return np.where(grows, number(told["pump"]["suction"]), number(told["pump"]["delivery"]))
-    steam = told["steam"]
+    if "pump" in entry:
+        return np.where(grows, number(entry["pump"]["suction"]), number(entry["pump"]["delivery"]))
+    steam = entry["steam"]
     high, low = number(steam["admission"]), number(steam["back_pressure"])
     cut, release, close, lead, c = (
         steam[key] for key in ("cut_off", "release", "compression", "lead", "clearance")
@@ -318,11 +319,11 @@ def chambers_torque(gas: dict[str, Any], k: int, m: Mechanism) -> np.ndarray:
     rise = slope(s.astype(complex), 1).real
     x = (s.max() - s) / np.ptp(s)
     force = np.zeros(FINE)
-    for told in gas["chambers"]:
-        if k + 1 in told.get("cylinders", [k + 1]):
-            head = told["end"] == "head"
-            area = 0.25 * math.pi * (number(told["bore"]) ** 2 - number(told.get("rod", 0.0)) ** 2)
-            over = chamber_pressure(told, x if head else 1.0 - x, (rise < 0.0) == head) - ATMOSPHERE
+    for entry in gas["chambers"]:
+        if k + 1 in entry.get("cylinders", [k + 1]):
+            head = entry["end"] == "head"
+            area = 0.25 * math.pi * (number(entry["bore"]) ** 2 - number(entry.get("rod", 0.0)) ** 2)
+            over = chamber_pressure(entry, x if head else 1.0 - x, (rise < 0.0) == head) - ATMOSPHERE
             force -= area * over * (1.0 if head else -1.0)
     return np.fft.rfft(force * rise)[: SAMPLES // 2 + 1] / FINE
 
@@ -350,20 +351,20 @@ def machine(engine: dict[str, Any], order: list[int] | None = None) -> Machine:
         "inline": _inline, "vee": _vee, "boxer": _boxer, "opposed-piston": _opposed, "radial": _radial, "parts": _parts,
         "rotary": _rotary,
     }[engine["layout"]]  # fmt: skip
-    found = build(engine)
-    given = order or engine.get("firing_order")
-    if "bore" in engine and given is not None:
-        found = _fired(found, list(given), turns)
-    return Machine(turns, tuple(found))
+    built = build(engine)
+    firing = order or engine.get("firing_order")
+    if "bore" in engine and firing is not None:
+        built = _fired(built, list(firing), turns)
+    return Machine(turns, tuple(built))
 
 
 def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[str, Any]:
-    told = {**engine, **(part or {})}
-    if told.get("drive") == "swinging-yoke":
-        return _yoke(told)
-    offset, deficit = number(told.get("offset", 0.0)), number(told.get("rod_inertia_deficit", 0.0))
-    rod = number(told["rod_length"])
-    stroke = number(told["stroke"])
+    entry = {**engine, **(part or {})}
+    if entry.get("drive") == "swinging-yoke":
+        return _yoke(entry)
+    offset, deficit = number(entry.get("offset", 0.0)), number(entry.get("rod_inertia_deficit", 0.0))
+    rod = number(entry["rod_length"])
+    stroke = number(entry["stroke"])
     # the stroke of a piston beside the crank's axis is longer than two crank radii
     radius = 0.5 * stroke
     if offset:
@@ -372,22 +373,22 @@ def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[
             0.3 * stroke, 0.5 * stroke, xtol=1e-16,
         )  # fmt: skip
     return {
-        "radius": radius, "rod": rod, "deficit": deficit, "offset": offset, "bore": number(told.get("bore", 0.0)),
-        "piston_mass": number(told["reciprocating_mass"]) + told.get("at_piston", 0.0),
-        "shank": told.get("shank", 0.0),
+        "radius": radius, "rod": rod, "deficit": deficit, "offset": offset, "bore": number(entry.get("bore", 0.0)),
+        "piston_mass": number(entry["reciprocating_mass"]) + entry.get("at_piston", 0.0),
+        "shank": entry.get("shank", 0.0),
     }  # fmt: skip
 
 
-def _yoke(told: dict[str, Any]) -> dict[str, Any]:
+def _yoke(entry: dict[str, Any]) -> dict[str, Any]:
     """The quick stroke takes 1 / (1 + ratio) of a turn, between the two places where crank and lever are square."""
-    pivot, stroke = number(told["pivot_distance"]), number(told["stroke"])
-    radius = pivot * math.cos(math.pi / (1.0 + told["return_ratio"]))
+    pivot, stroke = number(entry["pivot_distance"]), number(entry["stroke"])
+    radius = pivot * math.cos(math.pi / (1.0 + entry["return_ratio"]))
     length = 0.5 * stroke * pivot / radius
-    lever = told.get("lever", {})
+    lever = entry.get("lever", {})
     mass, centre, inertia = (number(lever.get(key, 0.0)) for key in ("mass", "centre_of_gravity", "inertia"))
-    weight, at = number(told.get("lever_weight", 0.0)), number(told.get("lever_weight_radius", 0.0))
+    weight, at = number(entry.get("lever_weight", 0.0)), number(entry.get("lever_weight_radius", 0.0))
     return {
-        "radius": radius, "rod": 0.0, "piston_mass": number(told["reciprocating_mass"]),
+        "radius": radius, "rod": 0.0, "piston_mass": number(entry["reciprocating_mass"]),
         "lever": Lever(pivot, length, length - pivot, mass, centre, inertia, weight, at),
     }  # fmt: skip
 
@@ -424,16 +425,16 @@ def spots(e: dict[str, Any], count: int, banks: int) -> list[tuple[int, int]]:
 
 def distances(e: dict[str, Any], count: int) -> list[float]:
     """Places along the crank from the front, at one distance or at a list of them."""
-    told = e.get("cylinder_spacing", 1.0)
-    if not isinstance(told, list):
-        return stations(count, number(told))
-    gone = np.concatenate([[0.0], np.cumsum([number(v) for v in told])])
+    spacing = e.get("cylinder_spacing", 1.0)
+    if not isinstance(spacing, list):
+        return stations(count, number(spacing))
+    gone = np.concatenate([[0.0], np.cumsum([number(v) for v in spacing])])
     return [float(0.5 * gone[-1] - x) for x in gone]
 
 
 def _in_banks(e: dict[str, Any], banks: int, per_throw: int, angle: float, split: float = 0.0) -> list[Mechanism]:
     """Pistons of one bank or two by their numbers, and then what else turns with the throws."""
-    throws, own, common = _radians(e["throws"]), own_tables(e), _common(e)
+    throws, rows, common = _radians(e["throws"]), own_tables(e), _common(e)
     count, row = len(throws) * per_throw, math.radians(e.get("row_angle", 0.0))
     at, per = spots(e, count, banks), count // banks
     xs, stagger = distances(e, per), number(e.get("bank_stagger", 0.0))
@@ -444,12 +445,12 @@ def _in_banks(e: dict[str, Any], banks: int, per_throw: int, angle: float, split
         pin = (place,) if per_throw == 2 else (bank, place)
         if pin not in pins:
             pins.append(pin)
-    pin_mass, found = number(e.get("rotating_mass", 0.0)) + e.get("at_throw", 0.0), []
+    pin_mass, parts = number(e.get("rotating_mass", 0.0)) + e.get("at_throw", 0.0), []
     turning = [[0.0, 0.0] for _ in pins]
     for k, (bank, place) in enumerate(at):
-        told = own.get(k, {})
-        numbers = _common(e, told)
-        if "offset" in told and "stroke" not in told:
+        entry = rows.get(k, {})
+        numbers = _common(e, entry)
+        if "offset" in entry and "stroke" not in entry:
             numbers["radius"] = common["radius"]
         side = 0.0 if banks == 1 else left * (1 - 2 * bank)
         lean = 0.5 * row * (-1.0) ** place
@@ -457,14 +458,14 @@ def _in_banks(e: dict[str, Any], banks: int, per_throw: int, angle: float, split
             numbers["offset"] *= math.copysign(1.0, lean)
         pin = pins.index((place,) if per_throw == 2 else (bank, place))
         x = xs[place] + (0.5 - bank) * stagger * (banks > 1)
-        turning[pin][0] += number(told["rotating_mass"]) if "rotating_mass" in told else pin_mass / per_throw
+        turning[pin][0] += number(entry["rotating_mass"]) if "rotating_mass" in entry else pin_mass / per_throw
         turning[pin][1] = xs[place] if per_throw == 2 else x
         pin_of = turning[pin][0] if per_throw == 1 else 0.0
-        found.append(Mechanism(x, throws[pin] - side * split, side * angle + lean, pin_mass=pin_of, **numbers))
+        parts.append(Mechanism(x, throws[pin] - side * split, side * angle + lean, pin_mass=pin_of, **numbers))
     if per_throw == 1:
-        return found
+        return parts
     still = {**common, "piston_mass": 0.0, "deficit": 0.0, "bore": 0.0, "offset": 0.0, "shank": 0.0}
-    return found + [Mechanism(x, t, 0.0, pin_mass=m, **still) for (m, x), t in zip(turning, throws, strict=True)]
+    return parts + [Mechanism(x, t, 0.0, pin_mass=m, **still) for (m, x), t in zip(turning, throws, strict=True)]
 
 
 def dead_centres(mechanisms: list[Mechanism]) -> list[float]:
@@ -503,7 +504,7 @@ def _with(m: Mechanism, **changed: Any) -> Mechanism:
 
 
 def _opposed(e: dict[str, Any]) -> list[Mechanism]:
-    count, own = len(e["throws"]), own_tables(e)
+    count, rows = len(e["throws"]), own_tables(e)
     lower = _inline(e)
     ratio, lead = int(e.get("crank_ratio", -1)), math.radians(e.get("crank_lead", 0.0))
     centre = complex(number(e["crank_distance"]))
@@ -511,9 +512,9 @@ def _opposed(e: dict[str, Any]) -> list[Mechanism]:
         _with(m, centre=centre, ratio=ratio, bank=math.pi, throw=math.pi + ratio * (m.throw + lead)) for m in lower
     ]
     for k in range(count):
-        told = {**e, **own.get(k, {})}
-        if "second_reciprocating_mass" in told:
-            upper[k] = _with(upper[k], piston_mass=number(told["second_reciprocating_mass"]))
+        entry = {**e, **rows.get(k, {})}
+        if "second_reciprocating_mass" in entry:
+            upper[k] = _with(upper[k], piston_mass=number(entry["second_reciprocating_mass"]))
     if "bore" in e:
         fires = [(m.bank - m.throw) % (2.0 * math.pi) for m in lower]
         lower = [_with(m, partner=(m.radius, m.rod, lead), fires=at) for m, at in zip(lower, fires, strict=True)]
@@ -522,20 +523,20 @@ def _opposed(e: dict[str, Any]) -> list[Mechanism]:
 
 def _parts(e: dict[str, Any]) -> list[Mechanism]:
     shafts = {s["name"]: s for s in e.get("shafts", [])}
-    found = []
+    parts = []
     for part in e["slider_cranks"]:
         shaft = shafts.get(part.get("shaft", ""), {})
         y, z = (number(v) for v in shaft.get("position", [0.0, 0.0]))
         ratio, bank = float(shaft.get("ratio", 1)), math.radians(part.get("bank_angle", 0.0))
         # what a shaft carries is as far ahead as it leads
         throw = math.radians(part.get("throw", 0.0) + ratio * shaft.get("lead", 0.0))
-        found.append(
+        parts.append(
             Mechanism(
                 number(part["x"]), throw, bank, pin_mass=number({**e, **part}.get("rotating_mass", 0.0)), ratio=ratio,
                 centre=complex(z, y), fires=(bank - throw) / ratio if "bore" in e else None, **_common(e, part),
             )
         )  # fmt: skip
-    return found
+    return parts
 
 
 def _radial(e: dict[str, Any]) -> list[Mechanism]:
@@ -544,19 +545,19 @@ def _radial(e: dict[str, Any]) -> list[Mechanism]:
     arm, at_knuckle = number(e["knuckle_radius"]), number(e.get("knuckle_mass", 0.0))
     turned = _radians(e.get("knuckle_angles", [360.0 * k / n for k in range(1, n)]))
     highest = math.sqrt((radius + rod) ** 2 - offset**2)
-    own = own_tables(e)
-    master = {**common, "piston_mass": number(own.get(0, {}).get("reciprocating_mass", common["piston_mass"]))}
-    found = [Mechanism(0.0, 0.0, 0.0, pin_mass=number(e.get("rotating_mass", 0.0)), **master)]
+    rows = own_tables(e)
+    master = {**common, "piston_mass": number(rows.get(0, {}).get("reciprocating_mass", common["piston_mass"]))}
+    parts = [Mechanism(0.0, 0.0, 0.0, pin_mass=number(e.get("rotating_mass", 0.0)), **master)]
     for k in range(1, n):
         bank, knuckle = 2.0 * math.pi * k / n, Knuckle(rod, 0.0, offset, arm, turned[k - 1])
         weighing = (("reciprocating_mass", common["piston_mass"]), ("knuckle_mass", at_knuckle))
-        mass, pin = (number(own.get(k, {}).get(key, default)) for key, default in weighing)
+        mass, pin = (number(rows.get(k, {}).get(key, default)) for key, default in weighing)
 
         def made(
             length: float, bank: float = bank, knuckle: Knuckle = knuckle, mass: float = mass, pin: float = pin
         ) -> Mechanism:
-            told = {**common, "rod": length, "piston_mass": mass}
-            return Mechanism(0.0, 0.0, bank, pin_mass=pin, knuckle=knuckle, **told)
+            entry = {**common, "rod": length, "piston_mass": mass}
+            return Mechanism(0.0, 0.0, bank, pin_mass=pin, knuckle=knuckle, **entry)
 
         def above(length: float) -> float:
             m = made(length)
@@ -570,8 +571,8 @@ def _radial(e: dict[str, Any]) -> list[Mechanism]:
             if "articulated_rod_length" in e
             else brentq(above, rod - 1.4 * arm, rod - 0.6 * arm, xtol=1e-15)
         )
-        found.append(made(length))
-    return found
+        parts.append(made(length))
+    return parts
 
 
 def firing_angles(mechanisms: list[Mechanism], order: list[int], turns: int) -> dict[int, float]:
@@ -600,12 +601,12 @@ def _upright_spectrum(m: Mechanism, turns: int) -> np.ndarray:
     return np.fft.rfft(mechanism_load(m, turns), axis=0) / SAMPLES
 
 
-def engine_spectrum(found: Machine) -> np.ndarray:
+def engine_spectrum(engine: Machine) -> np.ndarray:
     """Wrench of everything that moves with the cranks at unit speed; a throw that stands ahead moves earlier."""
-    orders = np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
+    orders = np.arange(SAMPLES // 2 + 1)[:, None] / engine.turns
     total = np.zeros((SAMPLES // 2 + 1, 6), complex)
-    for m in found.mechanisms:
-        at_zero = _upright_spectrum(_with(m, throw=0.0, fires=None), found.turns)
+    for m in engine.mechanisms:
+        at_zero = _upright_spectrum(_with(m, throw=0.0, fires=None), engine.turns)
         total += at_zero * np.exp(1j * orders * m.throw / m.ratio)
     return total
 
@@ -617,26 +618,26 @@ def _gas_spectrum(gas: str, m: Mechanism, turns: int, valves: str) -> np.ndarray
     return out
 
 
-def gas_spectrum(gas: dict[str, Any], found: Machine, valves: dict[int, str] | None = None) -> np.ndarray:
+def gas_spectrum(gas: dict[str, Any], engine: Machine, valves: dict[int, str] | None = None) -> np.ndarray:
     """Roll moment of all cylinders, each at its firing angle; `valves` of those that do not fire, by their index."""
-    orders = np.arange(SAMPLES // 2 + 1)[:, None] / found.turns
+    orders = np.arange(SAMPLES // 2 + 1)[:, None] / engine.turns
     total = np.zeros((SAMPLES // 2 + 1, 6), complex)
     if gas.get("chambers"):
-        for k, m in enumerate(found.mechanisms):
+        for k, m in enumerate(engine.mechanisms):
             if any(k + 1 in row.get("cylinders", [k + 1]) for row in gas["chambers"]) and m.piston_mass:
-                once = chambers_torque(gas, k, m)[: SAMPLES // 2 // found.turns + 1]
-                phases = np.exp(1j * orders[:: found.turns, 0][: len(once)] * (m.throw - m.bank))
-                total[:: found.turns, 3][: len(once)] += once * phases
+                once = chambers_torque(gas, k, m)[: SAMPLES // 2 // engine.turns + 1]
+                phases = np.exp(1j * orders[:: engine.turns, 0][: len(once)] * (m.throw - m.bank))
+                total[:: engine.turns, 3][: len(once)] += once * phases
     if gas["model"] == "chambers":
         return total
-    own = own_tables(gas)
+    rows = own_tables(gas)
     shared = {key: value for key, value in gas.items() if key not in ("single_cylinders", "chambers")}
-    for k, m in enumerate(found.mechanisms):
+    for k, m in enumerate(engine.mechanisms):
         if m.fires is not None:
             upright = _with(m, throw=0.0, bank=0.0, x=0.0, pin_mass=0.0, piston_mass=0.0, shank=0.0, fires=None)
-            told = json.dumps(
-                {**shared, **{key: v for key, v in own.get(k, {}).items() if key != "cylinders"}}, sort_keys=True
+            entry = json.dumps(
+                {**shared, **{key: v for key, v in rows.get(k, {}).items() if key != "cylinders"}}, sort_keys=True
             )
-            one = _gas_spectrum(told, upright, found.turns, (valves or {}).get(k, ""))
+            one = _gas_spectrum(entry, upright, engine.turns, (valves or {}).get(k, ""))
             total += one * np.exp(-1j * orders * m.fires)
     return total

@@ -44,11 +44,11 @@ def volume(shape: Shape, eccentricity: float) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _over(gas: str, shape: Shape, eccentricity: float) -> np.ndarray:
-    told = json.loads(gas)
+    keys = json.loads(gas)
     v = volume(shape, eccentricity)
     strokes = 4.0 * np.arange(ALL) / ALL
-    over = mixed_cycle(told, (v - v.min()) / np.ptp(v), strokes, 4)
-    return over - number(told.get("crankcase_pressure", ATMOSPHERE))
+    over = mixed_cycle(keys, (v - v.min()) / np.ptp(v), strokes, 4)
+    return over - number(keys.get("crankcase_pressure", ATMOSPHERE))
 
 
 def over(gas: dict[str, Any], m: Mechanism) -> np.ndarray:

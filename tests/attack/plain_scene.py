@@ -60,17 +60,17 @@ def smallest_ball(signal: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     if v.shape[1] == 1:
         k = np.array([int(np.argmax(v)), int(np.argmin(v))])
         return float(np.ptp(v)) * scale, k, np.array([[1.0], [-1.0]])
-    held = [int(np.argmax(np.linalg.norm(v - v[0], axis=1)))]
+    support = [int(np.argmax(np.linalg.norm(v - v[0], axis=1)))]
     for _ in range(200):
-        centre, radius, weights = circumsphere(v[held])
+        centre, radius, weights = circumsphere(v[support])
         far = np.linalg.norm(v - centre, axis=1)
         k = int(np.argmax(far))
-        if far[k] <= radius * (1.0 + 1e-12) + 1e-15 or k in held:
+        if far[k] <= radius * (1.0 + 1e-12) + 1e-15 or k in support:
             break
-        held = [h for h, w in zip(held, weights, strict=True) if w > 0.0] + [k]
-    centre, radius, weights = circumsphere(v[held])
-    pull = 2.0 * weights[:, None] * (v[held] - centre) / (radius or 1.0)
-    return 2.0 * float(np.linalg.norm(v - centre, axis=1).max()) * scale, np.array(held), pull
+        support = [h for h, w in zip(support, weights, strict=True) if w > 0.0] + [k]
+    centre, radius, weights = circumsphere(v[support])
+    pull = 2.0 * weights[:, None] * (v[support] - centre) / (radius or 1.0)
+    return 2.0 * float(np.linalg.norm(v - centre, axis=1).max()) * scale, np.array(support), pull
 
 
 def norm_of(norm: str, signal: np.ndarray, weights: np.ndarray) -> float:
@@ -172,67 +172,67 @@ class Scene:
         unit = _unit_load(self._key, self.order).copy()
         for _, x, place, ratio, unbalance, *_ in self.rotors:
             unit += np.fft.rfft(plain_loads.rotor_load(x, place, ratio, unbalance, self.turns), axis=0) / SAMPLES
-        found = [unit * speed**2 for speed in self.speeds]
+        signals = [unit * speed**2 for speed in self.speeds]
         if "gas" in self.table:
             for k, point in enumerate(self.points):
                 if point.get("gas", True):
-                    told = {**self.table["gas"], **({"imep": point["imep"]} if "imep" in point else {})}
-                    gas = json.dumps(told, sort_keys=True)
-                    found[k] = found[k] + _gas_load(self._key, self.order, gas, unfired_of(point))
-        return found
+                    keys = {**self.table["gas"], **({"imep": point["imep"]} if "imep" in point else {})}
+                    gas = json.dumps(keys, sort_keys=True)
+                    signals[k] = signals[k] + _gas_load(self._key, self.order, gas, unfired_of(point))
+        return signals
 
     @cached_property
-    def felt(self) -> np.ndarray:
+    def loaded_orders(self) -> np.ndarray:
         """Which orders carry any load."""
         size = np.max([np.abs(w).max(axis=1) for w in self.wrenches], axis=0)
         return np.flatnonzero(size > 1e-13 * size.max())
 
     def coefficients(self, channel: str, orders: list[float] | None) -> list[np.ndarray]:
         """Per operating point (n, places, d)."""
-        keep = self.felt
+        keep = self.loaded_orders
         if orders is not None:
             keep = np.array([k for k in keep if any(abs(self.orders[k] - o) < 1e-9 for o in orders)], dtype=int)
-        found = []
+        signals = []
         for wrench, speed in zip(self.wrenches, self.speeds, strict=True):
-            told = (self.orders[keep], wrench[keep], speed)
+            state = (self.orders[keep], wrench[keep], speed)
             if channel in ON_BLOCK:
                 part = wrench[keep][:, None, ON_BLOCK[channel]]
             elif channel == "mount force":
-                part = self.mounting.forces(*told)
+                part = self.mounting.forces(*state)
             else:
                 assert isinstance(self.mounting, plain_mounts.Elastic), channel
-                part = self.mounting.travel(*told)
+                part = self.mounting.travel(*state)
             whole = np.zeros((len(self.orders), *part.shape[1:]), complex)
             whole[keep] = part
-            found.append(whole)
-        return found
+            signals.append(whole)
+        return signals
 
-    def signal(self, asked: Table) -> np.ndarray:
+    def signal(self, term: Table) -> np.ndarray:
         """(points, places, samples, d) of a load that is asked for."""
-        _, channel = norm_and_channel(asked["quantity"])
+        _, channel = norm_and_channel(term["quantity"])
         if channel in plain_crankcase.CHANNELS:
-            return plain_crankcase.signal(self, _machine(self._key, self.order), channel, asked.get("orders"))
+            return plain_crankcase.signal(self, _machine(self._key, self.order), channel, term.get("orders"))
         if channel in plain_gear.SIZED:
             machine = _machine(self._key, self.order)
             return np.stack([plain_gear.stress(self, machine, channel, k) for k in range(len(self.points))])
-        found = [plain_mounts.over_cycle(c) for c in self.coefficients(channel, asked.get("orders"))]
-        signal = np.stack(found).transpose(0, 2, 1, 3)
+        signals = [plain_mounts.over_cycle(c) for c in self.coefficients(channel, term.get("orders"))]
+        signal = np.stack(signals).transpose(0, 2, 1, 3)
         if channel in ON_BLOCK:
-            return signal * np.array(asked.get("direction_weights", 1.0))
+            return signal * np.array(term.get("direction_weights", 1.0))
         names = [place.get("name", f"mount {k + 1}") for k, place in enumerate(self.table["mounts"]["places"])]
-        places = [names.index(name) for name in asked.get("mounts", names)]
-        return signal[:, places] * np.array(asked.get("direction_weights", [1.0, 1.0, 1.0]))
+        places = [names.index(name) for name in term.get("mounts", names)]
+        return signal[:, places] * np.array(term.get("direction_weights", [1.0, 1.0, 1.0]))
 
-    def weights(self, asked: Table) -> np.ndarray:
-        told = asked.get("operating_points")
-        counted = [told is None or point["name"] in told for point in self.points]
+    def weights(self, term: Table) -> np.ndarray:
+        names = term.get("operating_points")
+        counted = [names is None or point["name"] in names for point in self.points]
         return np.array([point.get("weight", 1.0) * c for point, c in zip(self.points, counted, strict=True)])
 
-    def measure(self, asked: Table) -> float:
+    def measure(self, term: Table) -> float:
         """The number of an objective's term or a limit."""
-        norm, channel = norm_and_channel(asked["quantity"])
+        norm, channel = norm_and_channel(term["quantity"])
         if norm:
-            return norm_of(norm, self.signal(asked), self.weights(asked))
+            return norm_of(norm, self.signal(term), self.weights(term))
         if channel == "running-gear mass":
             return plain_gear.mass(self.table, _machine(self._key, self.order))
         if channel == "throw clearance":
@@ -240,36 +240,36 @@ class Scene:
         if channel.endswith("mass"):
             return self.mass(channel)
         if channel.startswith("apex"):
-            at = np.array(self.speeds)[self.weights(asked) > 0.0].max()
+            at = np.array(self.speeds)[self.weights(term) > 0.0].max()
             return plain_rotary.apex(self.table["engine"], float(at), 1 + channel.endswith("acceleration"))
         if channel == "degree of irregularity":
-            return plain_crankcase.irregularity(self, _machine(self._key, self.order), self.weights(asked))
+            return plain_crankcase.irregularity(self, _machine(self._key, self.order), self.weights(term))
         block = self.mounting
         assert isinstance(block, plain_mounts.Elastic), channel
         if channel == "transmissibility":
-            return self._transmissibility(block, asked)
+            return self._transmissibility(block, term)
         return {
             "static sag": lambda: block.sag,
             "total stiffness": lambda: block.total,
-            "torque-roll residual": lambda: block.torque_roll(number(asked["frequency"])),
+            "torque-roll residual": lambda: block.torque_roll(number(term["frequency"])),
         }[channel]()
 
-    def _transmissibility(self, block: plain_mounts.Elastic, asked: Table) -> float:
-        found = []
-        for wrench, speed, weight in zip(self.wrenches, self.speeds, self.weights(asked), strict=True):
-            keep = [k for k in self.felt if k > 0]
-            if asked.get("orders") is not None:
-                keep = [k for k in keep if any(abs(self.orders[k] - o) < 1e-9 for o in asked["orders"])]
+    def _transmissibility(self, block: plain_mounts.Elastic, term: Table) -> float:
+        ratios = []
+        for wrench, speed, weight in zip(self.wrenches, self.speeds, self.weights(term), strict=True):
+            keep = [k for k in self.loaded_orders if k > 0]
+            if term.get("orders") is not None:
+                keep = [k for k in keep if any(abs(self.orders[k] - o) < 1e-9 for o in term["orders"])]
             if weight > 0.0 and keep:
                 passed = np.sum(np.abs(block.forces(self.orders[keep], wrench[keep], speed)) ** 2)
-                found.append(math.sqrt(passed / np.sum(np.abs(block.firm(wrench[keep])) ** 2)))
-        return max(found, default=0.0)
+                ratios.append(math.sqrt(passed / np.sum(np.abs(block.firm(wrench[keep])) ** 2)))
+        return max(ratios, default=0.0)
 
     def mass(self, channel: str) -> float:
         role = {"counterweight mass": "c", "balancer mass": "b", "added mass": "cb"}[channel]
         machines = _machine(self._key, self.order).mechanisms if "c" in role else []
         levers = sum(m.lever.weight for m in machines if m.lever is not None)
-        return levers + sum(abs(u) / radius for *_, u, radius, own in self.rotors if own in role)
+        return levers + sum(abs(u) / radius for *_, u, radius, kind in self.rotors if kind in role)
 
     @cached_property
     def objective(self) -> float:
@@ -277,7 +277,7 @@ class Scene:
 
     def violation(self, limit: Table) -> float:
         """By how much of itself a limit is broken; negative where it is kept."""
-        asked = {**limit, "quantity": limit["limit"]}
+        term = {**limit, "quantity": limit["limit"]}
         if limit["limit"] == "natural frequencies":
             block = self.mounting
             assert isinstance(block, plain_mounts.Elastic)
@@ -287,7 +287,7 @@ class Scene:
             a, b = (number(v) for v in limit.get("outside", [0.0, 0.0]))
             within = max((min(v - a, b - v) / b for v in f), default=-1.0) if b else -1.0
             return float(max(over, under, within))
-        value = self.measure(asked)
+        value = self.measure(term)
         over = value / number(limit["max"]) - 1.0 if "max" in limit else -1.0
         under = 1.0 - value / number(limit["min"]) if "min" in limit else -1.0
         return max(over, under)
@@ -300,7 +300,7 @@ class Scene:
 
 def terms_of(table: Table) -> list[Table]:
     """Terms of the objective."""
-    told = table.get("objective", {})
-    if "terms" in told:
-        return list(told["terms"])
-    return [{**told, "quantity": told["minimise"]}] if told else []
+    objective = table.get("objective", {})
+    if "terms" in objective:
+        return list(objective["terms"])
+    return [{**objective, "quantity": objective["minimise"]}] if objective else []

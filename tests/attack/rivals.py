@@ -13,7 +13,7 @@ from attack.openings import Openings
 from attack.plain_scene import Scene, Table
 from attack.star_list import even_stars
 
-KEPT = 1e-6
+EXCESS = 1e-6
 """Share by which a rival may pass a limit."""
 
 
@@ -32,13 +32,13 @@ class Rival:
     value: float
     violation: float
     vector: np.ndarray
-    told: Table
+    star: Table
     looked_at: int = 1
     bound: float = 0.0
     minimum_violation: float = -1.0
 
 
-def designs_told(openings: Openings) -> Iterator[Table]:
+def stars_of(openings: Openings) -> Iterator[Table]:
     """What may stand in [engine] in place of open stars."""
     engine = openings.table["engine"]
     if engine.get("throws") == "open":
@@ -48,67 +48,67 @@ def designs_told(openings: Openings) -> Iterator[Table]:
 
 
 def convex_rival(
-    openings: Openings, start: np.ndarray, told: Table, enough: float = np.inf, charge: float = 1e3
+    openings: Openings, start: np.ndarray, star: Table, target: float = np.inf, charge: float = 1e3
 ) -> Rival:
     """Where unbalances alone are open; looked for until none under `enough` can be left."""
-    program = Program(openings, told)
-    found = program.minimum(start, enough=enough, charge=charge)
-    if found.violation > KEPT:
-        minimum = program.minimum_violation(found.vector)
-        if minimum.violation <= KEPT:
-            found = program.minimum(minimum.vector, charge=1e6)
+    program = Program(openings, star)
+    optimum = program.minimum(start, target=target, charge=charge)
+    if optimum.violation > EXCESS:
+        minimum = program.minimum_violation(optimum.vector)
+        if minimum.violation <= EXCESS:
+            optimum = program.minimum(minimum.vector, charge=1e6)
         else:
-            scene = openings.scene(minimum.vector, told)
-            return Rival(scene.objective, minimum.violation, minimum.vector, told, minimum_violation=minimum.bound)
-    scene = openings.scene(found.vector, told)
-    return Rival(scene.objective, scene.worst, found.vector, told, bound=found.bound)
+            scene = openings.scene(minimum.vector, star)
+            return Rival(scene.objective, minimum.violation, minimum.vector, star, minimum_violation=minimum.bound)
+    scene = openings.scene(optimum.vector, star)
+    return Rival(scene.objective, scene.worst, optimum.vector, star, bound=optimum.bound)
 
 
-def best_star(openings: Openings, maximum: int, enough: float = np.inf) -> Rival | None:
+def best_star(openings: Openings, maximum: int, target: float = np.inf) -> Rival | None:
     """Every star by itself; None where there are too many, or none."""
-    told = list(designs_told(openings))
-    if not told or len(told) > maximum:
+    stars = list(stars_of(openings))
+    if not stars or len(stars) > maximum:
         return None
-    rivals = [convex_rival(openings, openings.nearest(np.zeros(openings.size)), star, enough) for star in told]
-    kept = [r for r in rivals if r.violation <= KEPT]
-    best = min(kept, key=lambda r: r.value) if kept else min(rivals, key=lambda r: r.violation)
-    return Rival(best.value, best.violation, best.vector, best.told, len(told), min(r.bound for r in rivals))
+    rivals = [convex_rival(openings, openings.nearest(np.zeros(openings.size)), star, target) for star in stars]
+    feasible = [r for r in rivals if r.violation <= EXCESS]
+    best = min(feasible, key=lambda r: r.value) if feasible else min(rivals, key=lambda r: r.violation)
+    return Rival(best.value, best.violation, best.vector, best.star, len(stars), min(r.bound for r in rivals))
 
 
 def least_broken(openings: Openings, maximum: int) -> Rival | None:
     """The design, of any star, that passes its limits least."""
-    told = list(designs_told(openings))
-    if not told or len(told) > maximum:
+    stars = list(stars_of(openings))
+    if not stars or len(stars) > maximum:
         return None
     best: Rival | None = None
-    for star in told:
-        found = Program(openings, star).minimum_violation(openings.nearest(np.zeros(openings.size)))
-        if best is None or found.violation < best.violation:
-            best = Rival(0.0, found.violation, found.vector, star, len(told), minimum_violation=found.bound)
+    for star in stars:
+        optimum = Program(openings, star).minimum_violation(openings.nearest(np.zeros(openings.size)))
+        if best is None or optimum.violation < best.violation:
+            best = Rival(0.0, optimum.violation, optimum.vector, star, len(stars), minimum_violation=optimum.bound)
     return best
 
 
-def charged(openings: Openings, unit: float, told: Table | None = None):
+def charged(openings: Openings, unit: float, star: Table | None = None):
     """Objective in its unit, and much more for what limits are passed by; infinite where nothing answers."""
 
     def value(vector: np.ndarray) -> float:
-        scene = openings.scene(openings.nearest(vector.copy()), told)
+        scene = openings.scene(openings.nearest(vector.copy()), star)
         try:
             over = max(scene.worst, 0.0)
-            found = scene.objective / unit + (100.0 * over + 0.1 if over > KEPT else 0.0)
+            penalised = scene.objective / unit + (100.0 * over + 0.1 if over > EXCESS else 0.0)
         except (np.linalg.LinAlgError, ValueError):
             return 1e9
-        return found if np.isfinite(found) else 1e9
+        return penalised if np.isfinite(penalised) else 1e9
 
     return value
 
 
 def local_rival(
-    openings: Openings, rng: np.random.Generator, starts: list[np.ndarray], calls: int, told: Table | None = None
+    openings: Openings, rng: np.random.Generator, starts: list[np.ndarray], calls: int, star: Table | None = None
 ) -> Rival:
     """Random designs and evolution, then a simplex from the best of them and from `starts`."""
-    unit = openings.scene(starts[0], told).objective or 1.0
-    value = charged(openings, unit, told)
+    unit = openings.scene(starts[0], star).objective or 1.0
+    value = charged(openings, unit, star)
     pool = [*starts, *(openings.random(rng) for _ in range(calls // 4))]
     values = [value(v) for v in pool]
     if openings.size <= 6:
@@ -123,12 +123,12 @@ def local_rival(
         simplex = start + 0.05 * np.vstack([np.zeros(openings.size), np.eye(openings.size)]) * np.where(
             start > 0.9, -1, 1
         )
-        found = minimize(
+        optimum = minimize(
             value, start, method="Nelder-Mead",
             options={"maxfev": calls // 4, "xatol": 1e-9, "fatol": 1e-10, "initial_simplex": simplex},
         )  # fmt: skip
-        pool.append(found.x)
-        values.append(found.fun)
+        pool.append(optimum.x)
+        values.append(optimum.fun)
     vector = openings.nearest(pool[int(np.argmin(values))].copy())
-    scene: Scene = openings.scene(vector, told)
-    return Rival(scene.objective, scene.worst, vector, told or {}, len(pool))
+    scene: Scene = openings.scene(vector, star)
+    return Rival(scene.objective, scene.worst, vector, star or {}, len(pool))

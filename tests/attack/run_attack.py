@@ -85,24 +85,28 @@ def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
 def finer(family: str, seed: int, folder: Path, effort: int) -> Verdict:
     """The same by a plain model that knows more of peaks and of the bends of gas torque, in a process of its own."""
     log = folder / "finer.jsonl"
-    told = ["run", family, "--from", str(seed), "--number", "1", "--log", str(log), "--effort", str(effort)]
+    words = ["run", family, "--from", str(seed), "--number", "1", "--log", str(log), "--effort", str(effort)]
     subprocess.run(
-        [sys.executable, __file__, *told], env={**os.environ, "ATTACK_SAMPLES": str(FINER)}, capture_output=True,
+        [sys.executable, __file__, *words], env={**os.environ, "ATTACK_SAMPLES": str(FINER)}, capture_output=True,
         check=True,
     )  # fmt: skip
     line = lines_of([log])[0]
     return Verdict(**{key: value for key, value in line.items() if key != "commit"})
 
 
-def run(told: argparse.Namespace) -> None:
+def run(arguments: argparse.Namespace) -> None:
     """Every family in turn, seed by seed, until the number or the time is reached."""
-    told.log.parent.mkdir(parents=True, exist_ok=True)
-    families = GROUPS.get(told.families) or told.families.split(",")
-    known, until, at = lines_of([told.log] if told.log.exists() else []), time.monotonic() + told.seconds, commit()
+    arguments.log.parent.mkdir(parents=True, exist_ok=True)
+    families = GROUPS.get(arguments.families) or arguments.families.split(",")
+    known, until, at = (
+        lines_of([arguments.log] if arguments.log.exists() else []),
+        time.monotonic() + arguments.seconds,
+        commit(),
+    )
     done = {(line["family"], line["seed"]) for line in known}
-    firsts = [int(first) for first in told.first.split(",")]
-    todo = [(name, first + k) for k in range(told.number) for first in firsts for name in families]
-    if told.again:
+    firsts = [int(first) for first in arguments.first.split(",")]
+    todo = [(name, first + k) for k in range(arguments.number) for first in firsts for name in families]
+    if arguments.again:
         todo = [(line["family"], line["seed"]) for line in known if line["wrong"] and line["family"] in families]
         done = set()
     for name, seed in todo:
@@ -111,12 +115,12 @@ def run(told: argparse.Namespace) -> None:
         if time.monotonic() > until:
             return
         try:
-            verdict = attacked(name, seed, told.effort)
+            verdict = attacked(name, seed, arguments.effort)
         except ValueError as error:
             # the plain model has no cycle of such a load
             print(name, seed, f"is not drawn: {error}", sep=" | ", flush=True)
             continue
-        with told.log.open("a", encoding="utf-8") as out:
+        with arguments.log.open("a", encoding="utf-8") as out:
             out.write(json.dumps({**verdict.line, "commit": at}) + "\n")
         if verdict.wrong:
             print(name, seed, verdict.status, *verdict.wrong, sep=" | ", flush=True)
@@ -126,15 +130,15 @@ def summary(lines: list[Table]) -> str:
     """Tell how many problems there are, what of them is false, and of how many nothing is known."""
     solved = [line for line in lines if line["kind"]]
     blank = [line for line in solved if line["kind"] == "local" and not line.get("bound", 1.0) > 0.0]
-    told = [f"{len(lines)} problems, {sum(bool(line['wrong']) for line in lines)} with a false claim or a defect"]
-    told += [f"  {line['family']} {line['seed']}: {'; '.join(line['wrong'])}" for line in lines if line["wrong"]]
-    told.append(f"{len(blank)} of {len(solved)} designs are local with bound 0")
+    text = [f"{len(lines)} problems, {sum(bool(line['wrong']) for line in lines)} with a false claim or a defect"]
+    text += [f"  {line['family']} {line['seed']}: {'; '.join(line['wrong'])}" for line in lines if line["wrong"]]
+    text.append(f"{len(blank)} of {len(solved)} designs are local with bound 0")
     for family in dict.fromkeys(line["family"] for line in lines):
-        own = [line for line in lines if line["family"] == family]
-        kinds = Counter(line["kind"] or line["status"] for line in own)
-        share = sum(line in blank for line in own)
-        told.append(f"  {family}: {dict(kinds)}, bound 0: {share}, {sum(line['seconds'] for line in own):.0f} s")
-    return "\n".join(told)
+        of_family = [line for line in lines if line["family"] == family]
+        kinds = Counter(line["kind"] or line["status"] for line in of_family)
+        share = sum(line in blank for line in of_family)
+        text.append(f"  {family}: {dict(kinds)}, bound 0: {share}, {sum(line['seconds'] for line in of_family):.0f} s")
+    return "\n".join(text)
 
 
 def main() -> None:
@@ -155,18 +159,18 @@ def main() -> None:
     summed.add_argument("logs", nargs="+", type=Path)
     paged = commands.add_parser("page", help="write results/attack/README.md from logs")
     paged.add_argument("logs", nargs="+", type=Path)
-    told = parser.parse_args()
-    if told.command == "page":
+    arguments = parser.parse_args()
+    if arguments.command == "page":
         PAGE.parent.mkdir(parents=True, exist_ok=True)
-        PAGE.write_text(page(told.logs, NAMES), encoding="utf-8")
+        PAGE.write_text(page(arguments.logs, NAMES), encoding="utf-8")
         return
-    if told.command == "sum":
-        print(summary(lines_of(told.logs)))
+    if arguments.command == "sum":
+        print(summary(lines_of(arguments.logs)))
         return
-    if told.command == "show":
-        print(toml(drawn(told.families, told.first)[0]))
+    if arguments.command == "show":
+        print(toml(drawn(arguments.families, arguments.first)[0]))
         return
-    run(told)
+    run(arguments)
 
 
 if __name__ == "__main__":

@@ -16,20 +16,20 @@ Generator = np.random.Generator
 
 def numbering(rng: Generator, count: int, banks: int, along: bool = False) -> Table:
     """Keys that number the cylinders; a list only where numbers need not run along the crank."""
-    found: Table = {}
+    keys: Table = {}
     kind = str(rng.choice(["usual", "alternating", "list"]))
     if kind == "list" and not along:
-        found["numbering"] = [int(k) + 1 for k in rng.permutation(count)]
+        keys["numbering"] = [int(k) + 1 for k in rng.permutation(count)]
     else:
         if kind == "alternating" and banks > 1:
-            found["numbering"] = "alternating"
+            keys["numbering"] = "alternating"
         if banks > 1 and rng.random() < 0.5:
-            found["first_bank"] = "right"
+            keys["first_bank"] = "right"
         if rng.random() < 0.4:
-            found["first_end"] = "flywheel"
+            keys["first_end"] = "flywheel"
     if rng.random() < 0.4:
-        found["rotation"] = "counter-clockwise"
-    return found
+        keys["rotation"] = "counter-clockwise"
+    return keys
 
 
 def weighed(rng: Generator, engine: Table, keys: list[str], share: float = 0.6) -> list[Table]:
@@ -60,8 +60,8 @@ def count_of(engine: Table) -> int:
 
 
 def uneven_spacing(rng: Generator, places: int) -> Table:
-    told = [f.q(rng.uniform(0.08, 0.16), "m") for _ in range(places - 1)]
-    return {"cylinder_spacing": told if places > 1 and rng.random() < 0.6 else f.q(rng.uniform(0.08, 0.14), "m")}
+    spaces = [f.q(rng.uniform(0.08, 0.16), "m") for _ in range(places - 1)]
+    return {"cylinder_spacing": spaces if places > 1 and rng.random() < 0.6 else f.q(rng.uniform(0.08, 0.14), "m")}
 
 
 def banked(rng: Generator) -> Table:
@@ -70,41 +70,41 @@ def banked(rng: Generator) -> Table:
     throws = {"inline": (1, 6), "vee": (1, 4), "boxer": (1, 3)}[layout]
     count = int(rng.integers(*throws)) * (2 if layout == "boxer" else 1)
     banks = 1 if layout == "inline" else 2
-    found = {"layout": layout, **f.mechanism(rng), "throws": f.throws(rng, count)}
-    cylinders = count_of(found)
-    found |= {**numbering(rng, cylinders, banks), **uneven_spacing(rng, cylinders // banks)}
+    engine = {"layout": layout, **f.mechanism(rng), "throws": f.throws(rng, count)}
+    cylinders = count_of(engine)
+    engine |= {**numbering(rng, cylinders, banks), **uneven_spacing(rng, cylinders // banks)}
     if layout == "vee":
-        found["bank_angle"] = float(round(rng.uniform(20.0, 150.0), 2))
+        engine["bank_angle"] = float(round(rng.uniform(20.0, 150.0), 2))
         if rng.random() < 0.5:
-            found["split_pin_angle"] = float(round(rng.uniform(-40.0, 60.0), 2))
+            engine["split_pin_angle"] = float(round(rng.uniform(-40.0, 60.0), 2))
     if banks == 2 and (layout == "boxer" or rng.random() < 0.5):
-        found["bank_stagger"] = f.q(rng.uniform(0.01, 0.05), "m")
+        engine["bank_stagger"] = f.q(rng.uniform(0.01, 0.05), "m")
     if layout != "boxer" and rng.random() < 0.3:
-        found["row_angle"] = float(round(rng.uniform(-20.0, 20.0), 2))
+        engine["row_angle"] = float(round(rng.uniform(-20.0, 20.0), 2))
     keys = ["reciprocating_mass", "rotating_mass", "rod_inertia_deficit", "offset", "rod_length"]
     keys += ["stroke"] if layout != "vee" else []
     # a rod or offset of its own beside a stroke on a shared pin would need another crank
-    if layout == "vee" and "offset" in found:
+    if layout == "vee" and "offset" in engine:
         keys.remove("rod_length")
-    rows = weighed(rng, found, keys)
-    return {**found, "single_cylinders": rows} if rows else found
+    rows = weighed(rng, engine, keys)
+    return {**engine, "single_cylinders": rows} if rows else engine
 
 
 def opposed(rng: Generator) -> Table:
-    found = f.opposed_piston(rng)
-    rows = weighed(rng, found, ["reciprocating_mass", "rotating_mass", "second_reciprocating_mass"])
-    return {**found, "single_cylinders": rows} if rows else found
+    engine = f.opposed_piston(rng)
+    rows = weighed(rng, engine, ["reciprocating_mass", "rotating_mass", "second_reciprocating_mass"])
+    return {**engine, "single_cylinders": rows} if rows else engine
 
 
 def radial(rng: Generator) -> Table:
-    found = f.radial(rng)
-    rows = weighed(rng, found, ["reciprocating_mass", "knuckle_mass"])
+    engine = f.radial(rng)
+    rows = weighed(rng, engine, ["reciprocating_mass", "knuckle_mass"])
     for row in rows:
         # the master rod has no knuckle pin
         if row["cylinders"] in (1, [1]):
             row.pop("knuckle_mass", None)
     rows = [row for row in rows if len(row) > 1]
-    return {**found, "single_cylinders": rows} if rows else found
+    return {**engine, "single_cylinders": rows} if rows else engine
 
 
 def fired(rng: Generator, engine: Table) -> Table | None:
@@ -112,9 +112,11 @@ def fired(rng: Generator, engine: Table) -> Table | None:
     count, turns = count_of(engine), 2 if engine["cycle"] == "four-stroke" else 1
     idle = {int(k) + 1 for k in rng.permutation(count)[: int(rng.random() < 0.3)]} if count > 2 else set()
     rows = {n: row for row in engine.get("single_cylinders", []) for n in [row["cylinders"]]}
-    kept = [row for row in engine.get("single_cylinders", []) if row["cylinders"] not in [*idle, *([n] for n in idle)]]
-    own = [{**_row(rows, n), "cylinders": n, "bore": "0.0 m"} for n in idle]
-    engine = {**engine, "single_cylinders": kept + own}
+    driving = [
+        row for row in engine.get("single_cylinders", []) if row["cylinders"] not in [*idle, *([n] for n in idle)]
+    ]
+    idle_rows = [{**_row(rows, n), "cylinders": n, "bore": "0.0 m"} for n in idle]
+    engine = {**engine, "single_cylinders": driving + idle_rows}
     own_mechanisms = machine({k: v for k, v in engine.items() if k != "bore"}).mechanisms[:count]
     tops = dead_centres(list(own_mechanisms))
     firing = [n for n in range(1, count + 1) if n not in idle]
@@ -125,14 +127,14 @@ def fired(rng: Generator, engine: Table) -> Table | None:
     gaps = np.diff([*sorted(at.values()), 360.0 * turns])
     if gaps.min() < 5.0 or gaps[:-1].max(initial=0.0) > 355.0:
         return None
-    found = {**engine, "firing_order": order}
-    if not found["single_cylinders"]:
-        del found["single_cylinders"]
-    return found
+    working = {**engine, "firing_order": order}
+    if not working["single_cylinders"]:
+        del working["single_cylinders"]
+    return working
 
 
 def _row(rows: dict[Any, Table], n: int) -> Table:
-    return next((row for told, row in rows.items() if told in (n, [n])), {}) if rows else {}
+    return next((row for numbers, row in rows.items() if numbers in (n, [n])), {}) if rows else {}
 
 
 def gas_of(rng: Generator, engine: Table) -> Table:
@@ -141,15 +143,15 @@ def gas_of(rng: Generator, engine: Table) -> Table:
         "model": "seiliger", "peak_pressure": f.q(rng.uniform(60, 85), "bar"), "imep": f.q(rng.uniform(6.5, 9), "bar"),
     }  # fmt: skip
     idle = [row["cylinders"] for row in engine.get("single_cylinders", []) if row.get("bore") == "0.0 m"]
-    own = []
+    rows = []
     for n in range(1, count_of(engine) + 1):
         if n not in idle and rng.random() < 0.4:
             row: Table = {"cylinders": [n], "imep": f.q(number(gas["imep"]) / 1e5 * rng.uniform(0.9, 1.05), "bar")}
             if rng.random() < 0.5:
                 row["peak_pressure"] = f.q(number(gas["peak_pressure"]) / 1e5 * rng.uniform(0.95, 1.1), "bar")
-            own.append(row)
-    if own:
-        gas["single_cylinders"] = own
+            rows.append(row)
+    if rows:
+        gas["single_cylinders"] = rows
     if idle and rng.random() < 0.7:
         chamber = {**f.chamber(rng, 1), "cylinders": idle}
         gas["chambers"] = [{**chamber, "name": "beside"}]
@@ -165,11 +167,11 @@ def gas(rng: Generator) -> Table:
             row["cylinders"] = row["cylinders"] if isinstance(row["cylinders"], int) else row["cylinders"][0]
             if rng.random() < 0.3:
                 row["bore"] = f.q(number(engine["bore"]) * rng.uniform(0.9, 1.0), "m")
-        found = fired(rng, engine)
-        if found is not None:
+        working = fired(rng, engine)
+        if working is not None:
             break
-    table = f.of_unbalances(lambda _: found)(rng)
-    return {**table, "gas": gas_of(rng, found)}
+    table = f.of_unbalances(lambda _: working)(rng)
+    return {**table, "gas": gas_of(rng, working)}
 
 
 def stars(rng: Generator) -> Table:

@@ -39,13 +39,13 @@ def even_stars(engine: Table) -> Iterator[Table]:
             yield {"throws": [360.0 * k / steps for k in places]}
         return
     for bank, split in angles_of(engine):
-        apart = (bank + split) * steps / 360.0
-        if abs(apart - round(apart)) > 1e-6:
+        steps_apart = (bank + split) * steps / 360.0
+        if abs(steps_apart - round(steps_apart)) > 1e-6:
             continue
         first = 0.5 * (bank + split)
-        for places in _stands(steps, count // 2, [0, round(apart) % steps], count // steps):
-            told = [first + 360.0 * k / steps for k in places]
-            yield {"throws": told, "bank_angle": bank, "split_pin_angle": split}
+        for places in _stands(steps, count // 2, [0, round(steps_apart) % steps], count // steps):
+            angles = [first + 360.0 * k / steps for k in places]
+            yield {"throws": angles, "bank_angle": bank, "split_pin_angle": split}
 
 
 def fired_stars(engine: Table, turns: int, count: int) -> Iterator[Table]:
@@ -64,10 +64,10 @@ def fired_stars(engine: Table, turns: int, count: int) -> Iterator[Table]:
             yield {"throws": throws, "firing_order": order}
 
 
-def _stands(steps: int, throws: int, own: list[int], each: int) -> Iterator[tuple[int, ...]]:
+def _stands(steps: int, throws: int, offsets: list[int], count: int) -> Iterator[tuple[int, ...]]:
     """Steps of all throws, the first at 0, so that every step has as many dead centres."""
     for rest in itertools.product(range(steps), repeat=throws - 1):
         places = (0, *rest)
-        fired = Counter((p + o) % steps for p in places for o in own)
-        if all(fired[s] == each for s in range(steps)):
+        fired = Counter((p + o) % steps for p in places for o in offsets)
+        if all(fired[s] == count for s in range(steps)):
             yield places

@@ -32,8 +32,8 @@ def is_global(result: Any) -> bool:
 def doubt(*results: Any) -> float:
     """What is left open of values, together; beside what is given they may vanish but for rounding."""
     left = sum((r.certificate.gap + r.error_estimate) * r.objective.value for r in results)
-    given = max(r.objective.initial for r in results if np.isfinite(r.objective.initial))
-    return left + READING * max(r.objective.value for r in results) + 1e-9 * given
+    start = max(r.objective.initial for r in results if np.isfinite(r.objective.initial))
+    return left + READING * max(r.objective.value for r in results) + 1e-9 * start
 
 
 def prices(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
@@ -42,10 +42,10 @@ def prices(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
     if result.objective is None or not is_global(result) or not result.objective.value:
         return []
     wrong = []
-    for k, told in enumerate(table.get("constraints", [])):
-        side = "max" if "max" in told else "min"
-        priced = next(limit for limit in result.limits if limit.name == told["name"])
-        sign, maximum = (1.0 if side == "max" else -1.0), number(told[side])
+    for k, entry in enumerate(table.get("constraints", [])):
+        side = "max" if "max" in entry else "min"
+        priced = next(limit for limit in result.limits if limit.name == entry["name"])
+        sign, maximum = (1.0 if side == "max" else -1.0), number(entry[side])
         looser, tighter = (solved(_moved(table, k, side, 1.0 + sign * s), folder) for s in (STEP, -STEP))
         step, unit = STEP * maximum, result.objective.value / maximum
         slack = doubt(result) / step + 0.02 * priced.shadow_price
@@ -57,7 +57,7 @@ def prices(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
         )
         if not low - slack <= priced.shadow_price <= high + slack:
             wrong.append(
-                f"price of {told['limit']} is {priced.shadow_price / unit:.5g} of value by limit, "
+                f"price of {entry['limit']} is {priced.shadow_price / unit:.5g} of value by limit, "
                 f"differences say {low / unit:.5g} to {high / unit:.5g}"
             )
     return wrong
@@ -65,15 +65,15 @@ def prices(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
 
 def _moved(table: Table, k: int, side: str, factor: float) -> Table:
     other = copy.deepcopy(table)
-    told = other["constraints"][k][side]
-    other["constraints"][k][side] = _times(told, factor)
+    bound = other["constraints"][k][side]
+    other["constraints"][k][side] = _times(bound, factor)
     return other
 
 
-def _times(told: Any, factor: float) -> Any:
-    if not isinstance(told, str):
-        return told * factor
-    value, _, unit = told.partition(" ")
+def _times(text: Any, factor: float) -> Any:
+    if not isinstance(text, str):
+        return text * factor
+    value, _, unit = text.partition(" ")
     return f"{float(value) * factor!r} {unit}"
 
 
@@ -88,9 +88,9 @@ def monotony(table: Table, rng: np.random.Generator, folder: Path) -> Complaints
         }
     )  # fmt: skip
     others = {"one more weight": wider}
-    for k, told in enumerate(table.get("constraints", [])):
-        side = "max" if "max" in told else "min"
-        others[f"{told['limit']} loosened"] = _moved(table, k, side, 1.05 if side == "max" else 0.95)
+    for k, entry in enumerate(table.get("constraints", [])):
+        side = "max" if "max" in entry else "min"
+        others[f"{entry['limit']} loosened"] = _moved(table, k, side, 1.05 if side == "max" else 0.95)
     return [line for what, other in others.items() for line in _no_worse(result, solved(other, folder), what)]
 
 
@@ -176,7 +176,7 @@ def invariance(table: Table, rng: np.random.Generator, folder: Path) -> Complain
     others: dict[str, tuple[Table, float]] = {"relabelled": (relabelled(table, rng), 1.0)}
     if table["engine"]["layout"] == "inline" and "gas" not in table:
         others["mirrored"] = (mirrored(table), 1.0)
-    sags = any(told.get("limit", told.get("minimise")) == "static sag" for told in _asked_of(table))
+    sags = any(entry.get("limit", entry.get("minimise")) == "static sag" for entry in _measures_of(table))
     units = {_unit(term["quantity"]) for term in terms_of(table)}
     if "gas" not in table and len(units) == 1 and None not in units:
         unit = units.pop()
@@ -188,17 +188,17 @@ def invariance(table: Table, rng: np.random.Generator, folder: Path) -> Complain
     wrong: Complaints = []
     for what, (other, factor) in others.items():
         try:
-            found = solved(other, folder)
+            answer = solved(other, folder)
         except ValueError as refused:
             # no engine has such sizes: a file may say so
             if "too large for any engine" not in str(refused):
                 raise
             continue
-        wrong += _as_good(result, found, factor, what)
+        wrong += _as_good(result, answer, factor, what)
     return wrong
 
 
-def _asked_of(table: Table) -> list[Table]:
+def _measures_of(table: Table) -> list[Table]:
     return [*table.get("constraints", []), table.get("objective", {})]
 
 

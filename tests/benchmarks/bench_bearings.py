@@ -59,8 +59,8 @@ def of_channels() -> list[str]:
     whole = laufruhe.load(PROBLEMS / "tractor-four-bearings.toml")
     problem = replace(whole, points=whole.points[:1])
     rounds = [[per_design(problem, channel) for channel in (None, *FORCES)] for _ in range(REPEATS)]
-    bare, *own = (statistics.median(times) for times in zip(*rounds, strict=True))
-    costs = [cost - bare for cost in own]
+    bare, *environment = (statistics.median(times) for times in zip(*rounds, strict=True))
+    costs = [cost - bare for cost in environment]
     return [
         f"| {channel} | {1e3 * cost:.2f} | {cost / costs[0]:.2f} |" for channel, cost in zip(FORCES, costs, strict=True)
     ]
@@ -71,10 +71,10 @@ def of_optima() -> list[str]:
     whole = laufruhe.load(PROBLEMS / "tractor-four-bearings.toml")
     mass = tuple(limit for limit in whole.limits if limit.measure.is_mass)
 
-    def asked(channel: LoadChannel, norm: str) -> Problem:
+    def term(channel: LoadChannel, norm: str) -> Problem:
         return replace(whole, objective=(Term(Measure(channel, NORMS[norm])),), limits=mass)
 
-    pairs = [(f"{norm} {channel}", asked(channel, norm)) for norm in ("mean", "maximum") for channel in FORCES[:2]]
+    pairs = [(f"{norm} {channel}", term(channel, norm)) for norm in ("mean", "maximum") for channel in FORCES[:2]]
     rows, before = [], 0.0
     for name, problem in [*pairs, ("as the ready problem, limits of peaks and mounts too", whole)]:
         times = []
@@ -105,7 +105,7 @@ def simulated_error(four: Scene, steps: int) -> float:
     return float(off.max() / np.hypot(left, up).max())
 
 
-def beside_simulation() -> list[str]:
+def simulation_rows() -> list[str]:
     """Time of one turn of the simulation that comes as near as is wanted, and of the analytic forces."""
     four = scene()
     tried = []
@@ -117,8 +117,8 @@ def beside_simulation() -> list[str]:
     rounds = []
     for k in range(REPEATS):
         new = four.lengthened(1.0 + 1e-3 * (k + 1))
-        own = [spent(lambda n=new: carried(n).sample(SAMPLES)) for _ in range(2)]
-        rounds.append((four.integration_seconds(steps), *own))
+        package = [spent(lambda n=new: carried(n).sample(SAMPLES)) for _ in range(2)]
+        rounds.append((four.integration_seconds(steps), *package))
     joint, fresh, again = (statistics.median(times) for times in zip(*rounds, strict=True))
     return [
         f"| exudyn, {steps} steps a turn | {reached:.1e} | {1e3 * joint:.1f} | 1 |",
@@ -132,9 +132,9 @@ def front() -> str:
     program = "from laufruhe.cli import app; app()"
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, "-c", program, "study", str(PROBLEMS / "bearing-pareto.toml"), "--out", folder]
-        own = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        package = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(words, env=own, check=True, capture_output=True)
+        subprocess.run(words, env=package, check=True, capture_output=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
     took = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return f"{took:.0f} s of a processor"
@@ -150,7 +150,7 @@ def orders() -> str:
 
 def main() -> None:
     """Measure and write the page."""
-    by_channel, optima, simulated, study, firing = of_channels(), of_optima(), beside_simulation(), front(), orders()
+    by_channel, optima, simulated, study, firing = of_channels(), of_optima(), simulation_rows(), front(), orders()
     lines = [
         "# Bearing forces beside mount forces and beside a multibody simulation",
         "",

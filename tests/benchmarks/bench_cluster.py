@@ -113,7 +113,7 @@ def stored(root: Path, part: str) -> tuple[float, int, int, int]:
     )
 
 
-def overheads(own: clusters.Cluster) -> tuple[list[str], float]:
+def overheads(cluster: clusters.Cluster) -> tuple[list[str], float]:
     """What one piece costs that does nothing; of a cluster [ms]."""
 
     def spent(executor: Executor) -> float:
@@ -122,30 +122,30 @@ def overheads(own: clusters.Cluster) -> tuple[list[str], float]:
         list(unordered_map(abs, [-1] * TASKS, executor))
         return 1e3 * (time.perf_counter() - began) / TASKS
 
-    with Processes(2) as pool, on_cluster(own.address) as dask:
+    with Processes(2) as pool, on_cluster(cluster.address) as dask:
         rows = [("this process", spent(SERIAL)), ("processes, 2", spent(pool)), ("Dask, 2 workers", spent(dask))]
-    told = [f"| {name} | {milliseconds:.2f} |" for name, milliseconds in rows]
-    return ["| who works | ms a piece |", "| --- | ---: |", *told], rows[-1][1]
+    lines = [f"| {name} | {milliseconds:.2f} |" for name, milliseconds in rows]
+    return ["| who works | ms a piece |", "| --- | ---: |", *lines], rows[-1][1]
 
 
 def shared(folder: Path) -> tuple[list[str], list[tuple[int, float, float, float]]]:
     """The same study on more and more workers, beside one process."""
     serial = clusters.prepared(folder / "serial", **SHARED)
     wall, alone, _ = timed(serial, "--jobs", "1")
-    rows, found = [f"| one process | {wall:.1f} | {alone:.1f} | | |"], []
+    rows, costs = [f"| one process | {wall:.1f} | {alone:.1f} | | |"], []
     for count in WORKERS:
-        with clusters.cluster(folder / f"c{count}", count) as own:
-            with on_cluster(own.address) as executor:
+        with clusters.cluster(folder / f"c{count}", count) as cluster:
+            with on_cluster(cluster.address) as executor:
                 while executor.count < count:  # type: ignore[attr-defined]
                     time.sleep(0.1)
-            here, before = clusters.prepared(folder / str(count), **SHARED), own.processor_time()
-            wall, client, _ = timed(here, "--scheduler", own.address)
-            at_work = own.processor_time() - before
+            here, before = clusters.prepared(folder / str(count), **SHARED), cluster.processor_time()
+            wall, client, _ = timed(here, "--scheduler", cluster.address)
+            at_work = cluster.processor_time() - before
         differ = clusters.same(serial, here)
-        found.append((count, wall, at_work, client))
+        costs.append((count, wall, at_work, client))
         rows.append(f"| {count} | {wall:.1f} | {client:.1f} | {at_work:.1f} | {', '.join(differ) or 'none'} |")
     head = "| workers | time [s] | core-seconds of the client | of all workers | files and arrays that differ |"
-    return [head, "| --- | ---: | ---: | ---: | --- |", *rows], found
+    return [head, "| --- | ---: | ---: | ---: | --- |", *rows], costs
 
 
 def killed(folder: Path, count: int) -> list[str]:
@@ -153,12 +153,12 @@ def killed(folder: Path, count: int) -> list[str]:
     serial = clusters.prepared(folder / "serial", **SMALL)
     seconds, _, _ = timed(serial, "--jobs", "1")
     tried, wrong = Counter[str](), []
-    with clusters.cluster(folder / "cluster", 2) as own:
+    with clusters.cluster(folder / "cluster", 2) as cluster:
         for seed in range(count):
             rng, here = random.Random(seed), clusters.prepared(folder / "run", **SMALL)
             for _ in range(rng.randint(1, 3)):
-                tried[_attacked(own, here, rng, seconds)] += 1
-            said = clusters.finished(here, "--scheduler", own.address)
+                tried[_attacked(cluster, here, rng, seconds)] += 1
+            said = clusters.finished(here, "--scheduler", cluster.address)
             differ = [said] if said else list(clusters.same(serial, here))
             wrong += [f"- run {seed}: {', '.join(differ)}"] if differ else []
             shutil.rmtree(here)
@@ -174,9 +174,9 @@ def killed(folder: Path, count: int) -> list[str]:
     ]
 
 
-def _attacked(own: clusters.Cluster, here: Path, rng: random.Random, seconds: float) -> str:
+def _attacked(cluster: clusters.Cluster, here: Path, rng: random.Random, seconds: float) -> str:
     """One run with one death at a random moment; says whose."""
-    running = clusters.started(here, "--scheduler", own.address)
+    running = clusters.started(here, "--scheduler", cluster.address)
     until = time.monotonic() + rng.uniform(1.0, max(seconds, 2.0))
     while time.monotonic() < until and running.poll() is None:
         time.sleep(0.05)
@@ -185,13 +185,13 @@ def _attacked(own: clusters.Cluster, here: Path, rng: random.Random, seconds: fl
     if who == "client":
         running.kill()
     elif who == "scheduler":
-        own.kill()
+        cluster.kill()
         time.sleep(rng.uniform(0.0, 3.0))
-        own.start(2)
+        cluster.start(2)
     else:
         for _ in range(1 if who == "worker" else 2):
-            own.kill_worker(rng.randrange(len(own.workers)))
-            own.add()
+            cluster.kill_worker(rng.randrange(len(cluster.workers)))
+            cluster.add()
     said = running.communicate()[1]
     if who != "client" and running.returncode:
         return f"{who} killed{late}: ended with {running.returncode}, {said.strip()[-200:]}"
@@ -204,18 +204,18 @@ def full_disk(folder: Path) -> list[str]:
     timed(serial, "--jobs", "1")
     words = [sys.executable, "-c", FULL.format(ROOM), "study", "s.toml", "--out", "out", "--jobs", "1"]
     ended = subprocess.run(words, cwd=here, env=clusters.environment(), capture_output=True, text=True)
-    kept = clusters.pieces_done(here)
+    pieces = clusters.pieces_done(here)
     again = clusters.finished(here, "--jobs", "1")
     differ = [again] if again else list(clusters.same(serial, here))
     first = f"A store of {ROOM >> 10} kB and no more ended the study with exit status {ended.returncode}, and one line:"
-    then = f"{kept} pieces were kept. With room made, the same command went on;"
+    then = f"{pieces} pieces were kept. With room made, the same command went on;"
     none = f"files that differ from those of one run: {', '.join(differ) or 'none'}."
     return [first, "", f"    {ended.stderr.strip()}", "", f"{then} {none}"]
 
 
 def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list[Cost]]:
     """Random designs and random scenes of growing numbers, in one process."""
-    found: tuple[list[Cost], list[Cost]] = [], []
+    costs: tuple[list[Cost], list[Cost]] = [], []
     for which, part, maximum in ((0, "designs", evaluations), (1, "engines", solves)):
         # the two largest of evaluations have no tables, and differ in draws alone
         for size in (maximum // 100, maximum // 10, maximum, *([4 * maximum] if which == 0 else [])):
@@ -224,9 +224,9 @@ def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list
             wall, cores, memory = timed(here, "--jobs", "1")
             _, done, files, size_of = stored(clusters.draws_in(here / "out"), part)
             assert done == size
-            found[which].append(Cost(size, wall, cores, files, size_of, memory))
+            costs[which].append(Cost(size, wall, cores, files, size_of, memory))
             shutil.rmtree(here)
-    return found
+    return costs
 
 
 def at_once(folder: Path, solves: int) -> Cost:
@@ -256,10 +256,10 @@ def plan(evaluated: list[Cost], solved: list[Cost], handing: float) -> list[str]
 
 def drawn(sizes: tuple[list[Cost], list[Cost]], counts: list[tuple[int, float, float, float]]) -> None:
     """Growth with size and with workers."""
-    own = (("evaluations", "blue", sizes[0]), ("proven solves", "orange", sizes[1]))
+    series = (("evaluations", "blue", sizes[0]), ("proven solves", "orange", sizes[1]))
     grown: list[p.Mark] = [
         p.Line([c.size for c in costs], [c.cores for c in costs], colour, name, marker="o")
-        for name, colour, costs in own
+        for name, colour, costs in series
     ]
     left = p.Panel(
         grown, p.Axis("draws", log=(1.0,)), p.Axis("core-seconds of the command", log=(1.0, 2.0, 5.0)), "Size"
@@ -279,7 +279,7 @@ def drawn(sizes: tuple[list[Cost], list[Cost]], counts: list[tuple[int, float, f
     save_picture(picture, OUT.with_suffix(""))
 
 
-def asked() -> argparse.Namespace:
+def command_line() -> argparse.Namespace:
     """How much of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=8)
@@ -302,20 +302,20 @@ def at_least(minimum: int) -> Callable[[str], int]:
 
 def main() -> None:
     """All of it."""
-    given = asked()
+    arguments = command_line()
     # on a busy machine a scheduler answers late
     own_cluster.ANSWERS = own_cluster.PATIENCE = 600.0
     lines = [HEAD.format(TASKS)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with clusters.cluster(folder / "empty", 2) as own:
-            rows, handing = overheads(own)
+        with clusters.cluster(folder / "empty", 2) as cluster:
+            rows, handing = overheads(cluster)
             lines += [*rows, ""]
-        told, counts = shared(folder / "shared")
-        lines += [SHARES.format(**SHARED), *told, "", IMPORTS, *killed(folder / "kills", given.kills)]
+        shares, counts = shared(folder / "shared")
+        lines += [SHARES.format(**SHARED), *shares, "", IMPORTS, *killed(folder / "kills", arguments.kills)]
         lines += ["", "## A full disk", "", *full_disk(folder / "disk"), ""]
-        sizes = grown(folder / "grown", given.evaluations, given.solves)
-        long = [LONG, "", COSTS, BAR, at_once(folder / "long", given.long).row(), ""] if given.long else []
+        sizes = grown(folder / "grown", arguments.evaluations, arguments.solves)
+        long = [LONG, "", COSTS, BAR, at_once(folder / "long", arguments.long).row(), ""] if arguments.long else []
     each_one = [
         f"One more takes {1e6 * each_of(costs):,.1f} µs of one core, from the runs of {costs[-2].size:,} and "
         f"{costs[-1].size:,}."

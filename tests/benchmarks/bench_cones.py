@@ -82,8 +82,8 @@ def one_large(size: str, name: str) -> None:
     import_module("clarabel")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with way(name):
-        found = decided(problem, model)
-    print(json.dumps((*found, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0)))
+        answer = decided(problem, model)
+    print(json.dumps((*answer, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0)))
 
 
 def main() -> None:
@@ -105,8 +105,8 @@ def main() -> None:
             f"| {size} | {a[0]:.3f} | {b[0]:.3f} | {a[0] / b[0]:.2f} | {a[3]:.0f} | {b[3]:.0f} "
             f"| {a[2]:.0e} | {b[2]:.0e} | {abs(a[1] - b[1]) / b[1]:.0e} |"
         )
-    count, own, other = ready_times()
-    lines.append(f"| {count} ready problems | {own:.2f} | {other:.2f} | {own / other:.2f} | | | | | |")
+    count, package, other = ready_times()
+    lines.append(f"| {count} ready problems | {package:.2f} | {other:.2f} | {package / other:.2f} | | | | | |")
     publish(OUT, "\n".join(lines) + "\n")
 
 
@@ -119,8 +119,8 @@ def ready_times() -> tuple[int, float, float]:
             for times, name in zip(best, WAYS, strict=True):
                 with way(name):
                     times[k] = min(times[k], decided(problem, model)[0])
-    own, other = (sum(times) for times in best)
-    return len(problems), own, other
+    package, other = (sum(times) for times in best)
+    return len(problems), package, other
 
 
 def measured(size: str, name: str) -> list[float]:

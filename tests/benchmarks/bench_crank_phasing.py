@@ -131,17 +131,17 @@ def rows() -> list[Row]:
     out = []
     for n in SIZES:
         space = space_of(n)
-        found = search_stars(space, COUPLE)
-        assert found.complete
+        text = search_stars(space, COUPLE)
+        assert text.complete
         enumeration = None
         if n <= MOST_ENUMERATED:
             start = time.process_time()
             listed = enumerate_stars(space, COUPLE)
             whole = time.process_time() - start
-            assert abs(listed.values[0] - found.values[0]) <= 1e-9 * max(1.0, listed.values[0])
+            assert abs(listed.values[0] - text.values[0]) <= 1e-9 * max(1.0, listed.values[0])
             enumeration = whole if n > 10 else seconds(lambda s=space: enumerate_stars(s, COUPLE))
         took = seconds(lambda s=space: search_stars(s, COUPLE))
-        out.append(Row(n, space.size, took, found.nodes, enumeration, float(found.values[0])))
+        out.append(Row(n, space.size, took, text.nodes, enumeration, float(text.values[0])))
         print(out[-1], flush=True)
     return out
 
@@ -155,16 +155,16 @@ def joint(n: int) -> tuple[str, ...]:
     floor = numerical_zero(problem)
     start = time.process_time()
     model = StarModel(phasing, family.space, family.geometry)
-    found = search_designs(model, family.stars, 1, problem.tolerance, 90.0, floor)
+    designs = search_designs(model, family.stars, 1, problem.tolerance, 90.0, floor)
     by_cuts = time.process_time() - start
     start = time.process_time()
     some = family.stars[:60]
     for star in some.tolist():
         solve_design(model, tuple(star), (), problem.tolerance, floor)
     every = (time.process_time() - start) * len(family.stars) / len(some)
-    gap = (found.solved[0].value - found.lower_bound) / max(found.solved[0].value, floor)
+    gap = (designs.solved[0].value - designs.lower_bound) / max(designs.solved[0].value, floor)
     return (
-        f"{n}", f"{len(family.stars)}", f"{by_cuts:.2f}", f"{len(found.solved)}", f"{gap:.1e}",
+        f"{n}", f"{len(family.stars)}", f"{by_cuts:.2f}", f"{len(designs.solved)}", f"{gap:.1e}",
         f"{every:.1f}{'' if len(some) == len(family.stars) else ' (from 60)'}", f"{every / by_cuts:.1f}",
     )  # fmt: skip
 
@@ -210,14 +210,14 @@ def table(head: tuple[str, ...], body: list[tuple[str, ...]]) -> str:
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in body)])
 
 
-def growth(found: list[Row]) -> None:
+def growth(results: list[Row]) -> None:
     """Time against size on a logarithmic scale."""
     figure = Figure(figsize=(7.0, 4.2), dpi=150)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.11, 0.13, 0.85, 0.75))
     series = (
-        ("halves that meet, proven", [(r.throws, r.search) for r in found], "#0072B2", "o-"),
-        ("enumeration, vectorised", [(r.throws, r.enumeration) for r in found if r.enumeration], "#8a8a8a", "s-"),
+        ("halves that meet, proven", [(r.throws, r.search) for r in results], "#0072B2", "o-"),
+        ("enumeration, vectorised", [(r.throws, r.enumeration) for r in results if r.enumeration], "#8a8a8a", "s-"),
     )
     for name, points, colour, mark in series:
         axes.semilogy(*zip(*points, strict=True), mark, color=colour, label=name, markersize=5, linewidth=1.5)
@@ -253,8 +253,8 @@ def rankings() -> str:
         proof = f"proof: {certificate.kind}, lower bound {certificate.lower_bound:.6g}"
         proof += f", KKT residual {certificate.kkt_residual:.0e}"
         parts.append(f"## {result.problem.title}")
-        found = f"{objective.name} {objective.value:.6g} {objective.unit}"
-        parts.append(f"`problems/{name}.toml`: {found} in {took:.1f} s of a processor; {proof}.")
+        designs = f"{objective.name} {objective.value:.6g} {objective.unit}"
+        parts.append(f"`problems/{name}.toml`: {designs} in {took:.1f} s of a processor; {proof}.")
         parts += [grid_text(grid) for grid in stars.crank_stars(result)]
     return "\n\n".join(parts) + "\n"
 
@@ -270,8 +270,8 @@ def main() -> None:
     """Measure and write."""
     on_one_core()
     publish(PAGES / "rankings.md", rankings())
-    found = rows()
-    growth(found)
+    results = rows()
+    growth(results)
     body = [
         (
             f"{r.throws}", f"{r.stars}", f"{r.search:.3f}", f"{r.nodes}",
@@ -279,7 +279,7 @@ def main() -> None:
             "" if r.enumeration is None else f"{r.enumeration / r.search:.2f}",
             f"{r.value:.6f}",
         )
-        for r in found
+        for r in results
     ]  # fmt: skip
     head = ("throws", "stars", "search s", "nodes", "enumeration s", "enumeration / search", "least couple")
     joined = ("throws", "stars", "cuts s", "programs", "gap", "every star s", "every / cuts")

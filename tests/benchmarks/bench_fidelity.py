@@ -88,7 +88,7 @@ def solve_times() -> Iterator[tuple[str, float, float]]:
     for name in SOLVED:
         problem = load(ROOT / "problems" / f"{name}.toml")
         pair = [problem, automatic(problem)]
-        times = [[_solve_time(each) for each in pair] for _ in range(6)][1:]
+        times = [[_solve_time(one) for one in pair] for _ in range(6)][1:]
         exact, auto = (min(column) for column in zip(*times, strict=True))
         yield name, exact, auto
 
@@ -113,8 +113,8 @@ def batches() -> list[str]:
         for count in (1000, 10_000, DESIGNS):
             values = random_decisions(problem, count)
             exact, auto = batch_times(problem, values)
-            found, truth = (prepare(own).objective(values) for own in (automatic(problem), problem))
-            error = float(np.abs(found / truth - 1.0).max())
+            answers, truth = (prepare(variant).objective(values) for variant in (automatic(problem), problem))
+            error = float(np.abs(answers / truth - 1.0).max())
             lines.append(
                 f"| {name} | {count:,} | {1e3 * exact:.1f} ms | {1e3 * auto:.1f} ms | {auto / exact:.2f} "
                 f"| {error:.1e} |"
@@ -134,8 +134,8 @@ def batches() -> list[str]:
 def batch_times(problem: Problem, values: np.ndarray) -> tuple[float, float]:
     """Return the processor time of many designs with all preparation, exact and automatic [s]."""
     exact, auto = (
-        min(spent(lambda own=own: prepare(own).objective(values)) for _ in range(3))
-        for own in (problem, automatic(problem))
+        min(spent(lambda variant=variant: prepare(variant).objective(values)) for _ in range(3))
+        for variant in (problem, automatic(problem))
     )
     return exact, auto
 
@@ -177,28 +177,28 @@ def growth() -> tuple[list[str], list[tuple[str, Sequence[int], list[float], flo
         "| with | from | to | time | exponent at the large end |",
         "| --- | ---: | ---: | ---: | ---: |",
     ]
-    found = []
+    rows = []
     for name, sizes, make in sweeps:
         works = [make(n) for n in sizes]
         # in turns, so that a busy minute of the machine slows all sizes
         rounds = [[seconds(work, 3) for work in works] for _ in range(20)]
         times = [min(column) for column in zip(*rounds, strict=True)]
         exponent = math.log(times[-1] / times[-3]) / math.log(sizes[-1] / sizes[-3])
-        found.append((name, sizes, times, exponent))
+        rows.append((name, sizes, times, exponent))
         lines.append(
             f"| {name} | {sizes[0]} | {sizes[-1]} | {1e3 * times[0]:.2f} to {1e3 * times[-1]:.2f} ms | {exponent:.2f} |"
         )
-    return [*lines, "", "![Time against cylinders, orders, mounts and samples](fidelity.png)"], found
+    return [*lines, "", "![Time against cylinders, orders, mounts and samples](fidelity.png)"], rows
 
 
-def draw(found: list[tuple[str, Sequence[int], list[float], float]], path: Path) -> None:
+def draw(rows: list[tuple[str, Sequence[int], list[float], float]], path: Path) -> None:
     """Four lines on one panel, sizes over the smallest of each."""
     style = importlib.import_module("laufruhe.plots.style")
     from matplotlib.ticker import FuncFormatter, LogLocator
 
     drawn = style.page(1, 1, (6.4, 3.8))
     axes = drawn.panels[0]
-    for (name, sizes, times, exponent), colour in zip(found, ("#0072B2", "#D55E00", "#009E73", "#555555"), strict=True):
+    for (name, sizes, times, exponent), colour in zip(rows, ("#0072B2", "#D55E00", "#009E73", "#555555"), strict=True):
         axes.plot([n / sizes[0] for n in sizes], [1e3 * t for t in times], "o-", color=colour, lw=1.3, ms=4)
         axes.annotate(f"{name}, {exponent:.2f}", (sizes[-1] / sizes[0], 1e3 * times[-1]), xytext=(6, 0),
                       textcoords="offset points", va="center", fontsize=8, color=colour)  # fmt: skip
@@ -218,10 +218,10 @@ def draw(found: list[tuple[str, Sequence[int], list[float], float]], path: Path)
 def main() -> None:
     """Measure and write."""
     lines = ["# Fidelity, batches and growth", "", "Processor time, the least of several calls on one core.", ""]
-    table, found = growth()
+    table, rows = growth()
     text = "\n".join([*lines, *solves(), *batches(), *table]) + "\n"
     publish(OUT, text)
-    draw(found, OUT.with_suffix(".png"))
+    draw(rows, OUT.with_suffix(".png"))
 
 
 if __name__ == "__main__":

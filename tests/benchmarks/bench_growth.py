@@ -33,7 +33,7 @@ MEGABYTE = 1e6
 # a forked process touches some 10 MB whatever it does, so less than this says nothing about growth [MB]
 NOISE = 14.0
 # designs that are evaluated in one call, in two sizes
-FEW, MANY = 20_000, 200_000
+SMALL, MANY = 20_000, 200_000
 
 
 def scene(
@@ -108,7 +108,7 @@ def elastic(springs: int, points: int = 1, cylinders: int = 4) -> dict[str, Any]
         places.append({"name": f"m{k}", "position": [f"{x} m", f"{y} m", "0 m"], "stiffness": stiffness})
     tables = scene(cylinders, shafts=0, points=points)
     order = [1, 3, 4, 2] if cylinders == 4 else list(range(1, cylinders + 1))
-    engine = {key: own for key, own in tables["engine"].items() if key != "throws"}
+    engine = {key: value for key, value in tables["engine"].items() if key != "throws"}
     engine |= {"bore": "100 mm", "firing_order": order}
     return {
         **tables, "engine": engine,
@@ -158,7 +158,7 @@ def proven(tables: dict[str, Any]) -> tuple[float, str]:
     return took, f"{proof.kind}, gap {proof.gap:.0e}" if proof.gap else f"{proof.kind}"
 
 
-def apart(works: Sequence[Callable[[], Any]]) -> list[tuple[Any, float]]:
+def in_processes(works: Sequence[Callable[[], Any]]) -> list[tuple[Any, float]]:
     """Return the answers of works, each in a forked process on one processor, and the memory that each added [MB]."""
     context, free = multiprocessing.get_context("fork"), sorted(os.sched_getaffinity(0))
     answers: list[Any] = [None] * len(works)
@@ -217,7 +217,7 @@ class Sweep:
         times, memory = [seconds for seconds, _ in answers], [added for _, added in answers]
         sign = "x " if self.grows_by_factor else ""
         grows = f"{sign}{fitted(sizes, memory):.2f}" if min(memory[len(memory) // 2 :]) >= NOISE else ""
-        cells = (", ".join(map(str, sizes)), ", ".join(map(told, times)), f"{sign}{fitted(sizes, times):.2f}",
+        cells = (", ".join(map(str, sizes)), ", ".join(map(seconds_text, times)), f"{sign}{fitted(sizes, times):.2f}",
                  ", ".join(f"{added:.0f}" for added in memory), grows)  # fmt: skip
         return f"| {self.what} | {self.by} | {' | '.join(cells)} |"
 
@@ -283,10 +283,10 @@ def many_designs(source: Any, count: int) -> float:
 
 def designs_row(name: str, answers: Sequence[tuple[float, float]]) -> str:
     """Return time and memory of one more design by two sizes, and of a thousand million by extrapolation."""
-    (few, few_memory), (many, many_memory) = answers
-    each, size = (many - few) / (MANY - FEW), MEGABYTE * (many_memory - few_memory) / (MANY - FEW)
-    return (f"| {name} | {told(few)} | {told(many)} | {1e6 * each:.2g} µs | {size:.0f} B "
-            f"| {1e9 * each / 3600.0:.2g} h | {size:,.0f} GB |")  # fmt: skip
+    (small, few_memory), (many, many_memory) = answers
+    seconds_each, size = (many - small) / (MANY - SMALL), MEGABYTE * (many_memory - few_memory) / (MANY - SMALL)
+    return (f"| {name} | {seconds_text(small)} | {seconds_text(many)} | {1e6 * seconds_each:.2g} µs | {size:.0f} B "
+            f"| {1e9 * seconds_each / 3600.0:.2g} h | {size:,.0f} GB |")  # fmt: skip
 
 
 def exponent(sizes: Sequence[int], times: Sequence[float]) -> float:
@@ -302,7 +302,7 @@ def factor(sizes: Sequence[int], times: Sequence[float]) -> float:
     return float(np.exp(np.polyfit(sizes[first:], np.log(times[first:]), 1)[0]))
 
 
-def told(seconds: float) -> str:
+def seconds_text(seconds: float) -> str:
     """With a unit that reads well."""
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
@@ -331,21 +331,21 @@ def main() -> None:
     large, designs = () if quick else LARGE, DESIGNS[:1] if quick else DESIGNS
     works: list[list[Callable[[], Any]]] = [sweep.works(quick) for sweep in SWEEPS]
     works += [[lambda make=make: evaluated(make()), lambda make=make: proven(make())] for _, make in large]
-    works += [[lambda make=make, n=n: many_designs(make(), n) for n in (FEW, MANY)] for _, make in designs]
-    flat = iter(apart(list(chain(*works))))
+    works += [[lambda make=make, n=n: many_designs(make(), n) for n in (SMALL, MANY)] for _, make in designs]
+    flat = iter(in_processes(list(chain(*works))))
     answers = [[next(flat) for _ in group] for group in works]
     lines += [sweep.row(answer) for sweep, answer in zip(SWEEPS, answers, strict=False)]
     lines += ["", "## What to expect of large problems", ""]
     lines += ["| problem | evaluate | solve | memory [MB] | what is proven |", "| --- | ---: | ---: | ---: | --- |"]
     for (name, _), ((seconds, _), ((took, proof), added)) in zip(large, answers[len(SWEEPS) :], strict=False):
-        lines.append(f"| {name} | {told(seconds)} | {told(took)} | {added:.0f} | {proof} |")
+        lines.append(f"| {name} | {seconds_text(seconds)} | {seconds_text(took)} | {added:.0f} | {proof} |")
     lines += ["", "## A thousand million designs, by extrapolation", ""]
     lines += [
-        f"`laufruhe.evaluate_many` was run with {FEW:,} and {MANY:,} designs of random unbalances. The difference is",
+        f"`laufruhe.evaluate_many` was run with {SMALL:,} and {MANY:,} designs of random unbalances. The difference is",
         "the cost of one more design, and a thousand million times that the last two columns: of one core, and of one",
         "table with all designs. Pieces of a million designs need a thousandth of that memory.",
         "",
-        f"| problem | {FEW:,} | {MANY:,} | one more | memory of one more | 1e9: one core | 1e9: memory |",
+        f"| problem | {SMALL:,} | {MANY:,} | one more | memory of one more | 1e9: one core | 1e9: memory |",
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for (name, _), answer in zip(designs, answers[len(SWEEPS) + len(large) :], strict=True):

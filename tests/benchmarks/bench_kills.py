@@ -26,10 +26,10 @@ results has none, or all of one run. What a crash of the machine leaves is not t
 """
 
 
-def page(told: kills.Told, studies: int, points: int, solves: int) -> str:
+def page(counts: kills.Told, studies: int, points: int, solves: int) -> str:
     """What was tried and what came of it."""
-    rows = [f"| {what} | {count} |" for what, count in sorted(told.tried.items())]
-    wrong = [f"- {line}" for line in told.wrong] or ["None."]
+    rows = [f"| {what} | {count} |" for what, count in sorted(counts.tried.items())]
+    wrong = [f"- {line}" for line in counts.wrong] or ["None."]
     head = [
         "# Killed studies and solves",
         "",
@@ -44,14 +44,14 @@ def main() -> None:
     """Try as many as asked."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else TRIED
     with tempfile.TemporaryDirectory() as name:
-        whole, told = kills.uninterrupted(Path(name) / "whole"), kills.Told()
+        whole, counts = kills.uninterrupted(Path(name) / "whole"), kills.Told()
         for seed in range(count):
-            kills.attacked(Path(name) / "s", seed, whole, told)
+            kills.attacked(Path(name) / "s", seed, whole, counts)
         solved = solve_kills.uninterrupted(Path(name) / "solved")
         for seed in range(count // 3):
-            solve_kills.attacked(Path(name) / "s", seed, solved, told)
-    publish(OUT, page(told, count, 4 * 7 + 12 + 1, count // 3))
-    sys.exit(bool(told.wrong))
+            solve_kills.attacked(Path(name) / "s", seed, solved, counts)
+    publish(OUT, page(counts, count, 4 * 7 + 12 + 1, count // 3))
+    sys.exit(bool(counts.wrong))
 
 
 if __name__ == "__main__":

@@ -102,27 +102,27 @@ def frames(page: Page, path: Path) -> tuple[list[float], float]:
     page.locator("[data-decision]").first.wait_for()
     script = DRAG.replace("SLIDER", "0")
     page.evaluate(script, 30)
-    asked = page.context.new_cdp_session(page)
-    asked.send("Performance.enable", {"timeDomain": "threadTicks"})
-    before = spent_by(asked)
-    found = page.evaluate(script, MOVES)
-    return found, 1e3 * (spent_by(asked) - before) / MOVES
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+    before = spent_by(session)
+    intervals = page.evaluate(script, MOVES)
+    return intervals, 1e3 * (spent_by(session) - before) / MOVES
 
 
-def spent_by(asked: CDPSession) -> float:
+def spent_by(session: CDPSession) -> float:
     """Processor time of all tasks of the page's thread until now: script, style, layout, painting [s]."""
-    told = {each["name"]: each["value"] for each in asked.send("Performance.getMetrics")["metrics"]}
-    return float(told["TaskDuration"])
+    metrics = {metric["name"]: metric["value"] for metric in session.send("Performance.getMetrics")["metrics"]}
+    return float(metrics["TaskDuration"])
 
 
-def updates(page: Page, selector: str, told: str) -> list[float]:
+def updates(page: Page, selector: str, name: str) -> list[float]:
     """Milliseconds from an input event to the end of the frame that shows it."""
-    script, found = UPDATE.replace("SLIDER", "0"), []
+    script, times = UPDATE.replace("SLIDER", "0"), []
     for k in range(UPDATES + 5):
-        found.append(
-            page.evaluate(script, {"selector": selector, "told": told, "share": 0.1 + 0.8 * (0.618 * k % 1.0)})
+        times.append(
+            page.evaluate(script, {"selector": selector, "told": name, "share": 0.1 + 0.8 * (0.618 * k % 1.0)})
         )
-    return found[5:]
+    return times[5:]
 
 
 def loads(problem: Problem, path: Path) -> None:
@@ -132,8 +132,10 @@ def loads(problem: Problem, path: Path) -> None:
         widths = [decision.set.width for decision in problem.decisions]
         ends = np.cumsum(widths)
         values = [complex(*x[end - width : end]) for end, width in zip(ends, widths, strict=True)]
-        found = evaluate(problem, problem.design(values)).loads
-        return np.stack([one.mount_forces.sample(720)[:, :, 1:] for one in found if one.mount_forces is not None])
+        design_loads = evaluate(problem, problem.design(values)).loads
+        return np.stack(
+            [one.mount_forces.sample(720)[:, :, 1:] for one in design_loads if one.mount_forces is not None]
+        )
 
     count = sum(decision.set.width for decision in problem.decisions)
     fixed = at(np.zeros(count))
@@ -153,8 +155,8 @@ def in_dash(python: str, problem: Problem, page: Page, folder: Path) -> list[flo
     try:
         for _ in range(100):
             time.sleep(0.1)
-            with socket.socket() as asked:
-                if asked.connect_ex(("127.0.0.1", port)) == 0:
+            with socket.socket() as listener:
+                if listener.connect_ex(("127.0.0.1", port)) == 0:
                     break
         page.goto(f"http://127.0.0.1:{port}/")
         page.locator(".js-plotly-plot").nth(2).wait_for()
@@ -184,13 +186,13 @@ def main() -> None:
     drags, rows = [], []
     with tempfile.TemporaryDirectory() as name, launched() as browser, watched(browser) as seen:
         page, folder, version = seen.page, Path(name), browser.version
-        for told, make in scenes.items():
+        for scene, make in scenes.items():
             problem = make()
             work, processor = frames(page, report(problem, folder))
-            drags.append(f"{_row(told, work)} {processor:.1f} |")
-            rows.append(_row(f"live page, {told}", updates(page, "[data-decision]", "[data-measure=objective]")))
+            drags.append(f"{_row(scene, work)} {processor:.1f} |")
+            rows.append(_row(f"live page, {scene}", updates(page, "[data-decision]", "[data-measure=objective]")))
             if python:
-                rows.append(_row(f"Dash, {told}", in_dash(python, problem, page, folder)))
+                rows.append(_row(f"Dash, {scene}", in_dash(python, problem, page, folder)))
         assert seen.refused == []
     publish(OUT, TEXT.format(
         drags="\n".join(drags), rows="\n".join(rows), moves=MOVES, updates=UPDATES, frame=FRAME,

@@ -91,11 +91,11 @@ def many_speeds(problem: Problem) -> list[str]:
     speeds = np.linspace(300.0, 3000.0, 1000) * RPM
 
     def loop() -> list[object]:
-        found = []
+        optima = []
         for speed in speeds:
             at = OperatingPoint("", float(speed), point.gas)
-            found.append(mounting_in(engine).forces(shaking_loads(engine, at, problem.fidelity), float(speed)))
-        return found
+            optima.append(mounting_in(engine).forces(shaking_loads(engine, at, problem.fidelity), float(speed)))
+        return optima
 
     def at_once() -> object:
         return speed_map(mounting_in(engine), *split_loads(engine, point, problem.fidelity), speeds)
@@ -129,8 +129,8 @@ def joint(problem: Problem) -> list[str]:
     started = processor_seconds()
     optima = solve_nonlinear(*_program(problem), max_iterations=ITERATIONS)
     alone = processor_seconds() - started
-    found = [_by_slsqp(problem, mounts, columns) for mounts, columns in start_points(problem)[0]]
-    values = [value for value, _, kept in found if kept]
+    by_slsqp = [_by_slsqp(problem, mounts, columns) for mounts, columns in start_points(problem)[0]]
+    values = [value for value, _, is_kept in by_slsqp if is_kept]
     reached = sum(value <= result.objective.value * 1.01 for value in values)
     usable = [optimum.value for optimum in optima if optimum.usable]
     ended = sum(value <= result.objective.value * 1.01 for value in usable)
@@ -140,7 +140,7 @@ def joint(problem: Problem) -> list[str]:
         "| method | starts | seconds | within all limits | at the best to 1 % | best mean force [N] |",
         "| --- | ---: | ---: | ---: | ---: | ---: |",
         f"| IPOPT, exact derivatives | {STARTS} | {alone:.1f} | {len(usable)} | {ended} | {min(usable):.4f} |",
-        f"| SLSQP, finite differences | {STARTS} | {sum(t for _, t, _ in found):.1f} | {len(values)} | {reached} | "
+        f"| SLSQP, finite differences | {STARTS} | {sum(t for _, t, _ in by_slsqp):.1f} | {len(values)} | {reached} | "
         f"{min(values, default=math.nan):.4f} |",
         f"| search of `laufruhe solve`, ended when nothing better is to be expected (N5) | {tried} | "
         f"{ended_early:.1f} | | | {search.best_or_initial.design.value:.4f} |",

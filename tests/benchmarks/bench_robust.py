@@ -24,9 +24,9 @@ def drawn(tolerances: Tolerances, random: np.random.Generator, count: int, how: 
     """Errors of engines."""
     if how == "at their limits":
         errors = random.choice([-1.0, 1.0], (count, tolerances.count))
-        for own in (c for c in tolerances.columns if c.stop - c.start > 1):
+        for model in (c for c in tolerances.columns if c.stop - c.start > 1):
             angle = random.uniform(0.0, 2.0 * np.pi, count)
-            errors[:, own] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            errors[:, model] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         return errors
     law = Law.NORMAL if how == "normal" else Law.UNIFORM
     return np.concatenate([t.draw(random, count) for t in of_law(tolerances, law)], axis=1)
@@ -48,8 +48,8 @@ def main() -> None:
     for how in LAWS:
         random, started, maximum, over = np.random.default_rng(2026), time.process_time(), 0.0, 0
         for _ in range(ENGINES // PIECE):
-            found = objective_values(built.terms, drawn(tolerances_of(problem), random, PIECE, how))
-            maximum, over = max(maximum, float(found.max())), over + int((found > worst).sum())
+            values = objective_values(built.terms, drawn(tolerances_of(problem), random, PIECE, how))
+            maximum, over = max(maximum, float(values.max())), over + int((values > worst).sum())
         rows.append(
             [how, f"{ENGINES:,}", f"{maximum:.3f}", f"{worst:.3f}", f"{over}", f"{time.process_time() - started:.0f}"]
         )

@@ -64,14 +64,14 @@ def measured(name: str, control: str, folder: Path) -> np.ndarray:
             page = seen.page
             page.goto(address)
             page.locator('#claim[data-last="true"]').wait_for(timeout=PATIENCE)
-            asked = {"control": control, "moves": MOVES, "spacing": SPACING}
-            page.evaluate(SLIDE, {**asked, "moves": 10})
-            found = page.evaluate(SLIDE, asked)
+            arguments = {"control": control, "moves": MOVES, "spacing": SPACING}
+            page.evaluate(SLIDE, {**arguments, "moves": 10})
+            times = page.evaluate(SLIDE, arguments)
             assert not seen.refused
     finally:
         server.terminate()
         server.wait()
-    return np.array(found)
+    return np.array(times)
 
 
 def chromium_version() -> str:

@@ -60,16 +60,16 @@ def seconds(command: list[str], compiled: str) -> Times:
         return processor_seconds() - start, time.perf_counter() - began
 
 
-def in_turns(own: Callable[[], Times], other: Callable[[], Times], repeats: int) -> tuple[Times, Times]:
+def in_turns(package: Callable[[], Times], other: Callable[[], Times], repeats: int) -> tuple[Times, Times]:
     """Medians of two things measured in turns, so that both see the same machine."""
-    own(), other()
-    pairs = [(own(), other()) for _ in range(repeats)]
+    package(), other()
+    pairs = [(package(), other()) for _ in range(repeats)]
     return middle([a for a, _ in pairs]), middle([b for _, b in pairs])
 
 
-def middle(found: list[Times]) -> Times:
+def middle(runs: list[Times]) -> Times:
     """Medians of both times."""
-    return statistics.median(a for a, _ in found), statistics.median(b for _, b in found)
+    return statistics.median(a for a, _ in runs), statistics.median(b for _, b in runs)
 
 
 def command_rows() -> list[Row]:
@@ -86,8 +86,8 @@ def command_rows() -> list[Row]:
     rows = []
     with tempfile.TemporaryDirectory() as compiled:
         for command, imports in pairs:
-            own, other = (partial(seconds, words, compiled) for words in (command, [python, "-c", imports]))
-            a, b = in_turns(own, other, 7)
+            package, other = (partial(seconds, words, compiled) for words in (command, [python, "-c", imports]))
+            a, b = in_turns(package, other, 7)
             rows.append(
                 (" ".join(["laufruhe", *(Path(word).name for word in command[3:])]), a, NAMES.get(imports, imports), b)
             )
@@ -104,15 +104,15 @@ def resolve_rows() -> list[Row]:
         start, began = time.process_time(), time.perf_counter()
         for affine in sweep:
             solve_cones(affine)
-        own = (time.process_time() - start) / len(sweep), (time.perf_counter() - began) / len(sweep)
+        package = (time.process_time() - start) / len(sweep), (time.perf_counter() - began) / len(sweep)
         # Clarabel tells its clock alone
         with patch.object(conic, "newton_solution", lambda _: None):
             inside = sum(solve_cones(affine).solver_seconds for affine in sweep)
-        rows.append((f"re-solve at {samples} angles", own, "Clarabel alone", (math.nan, inside / len(sweep))))
+        rows.append((f"re-solve at {samples} angles", package, "Clarabel alone", (math.nan, inside / len(sweep))))
     return rows
 
 
-def told(value: float, digits: int) -> str:
+def duration_text(value: float, digits: int) -> str:
     """A number; a dash where none was measured."""
     return "-" if math.isnan(value) else f"{value:.{digits}f}"
 
@@ -143,9 +143,9 @@ def main() -> None:
         "| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: |",
     ]
     lines += [
-        f"| {name} | {1e3 * own[0]:.1f} | {1e3 * own[1]:.1f} | {beside} | {told(1e3 * other[0], 1)} "
-        f"| {1e3 * other[1]:.1f} | {told(own[0] / other[0], 2)} | {own[1] / other[1]:.2f} |"
-        for name, own, beside, other in (*command_rows(), *resolve_rows())
+        f"| {name} | {1e3 * package[0]:.1f} | {1e3 * package[1]:.1f} | {rival} | {duration_text(1e3 * other[0], 1)} "
+        f"| {1e3 * other[1]:.1f} | {duration_text(package[0] / other[0], 2)} | {package[1] / other[1]:.2f} |"
+        for name, package, rival, other in (*command_rows(), *resolve_rows())
     ]
     text = "\n".join(lines) + "\n"
     publish(OUT, text)

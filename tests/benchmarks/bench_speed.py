@@ -56,13 +56,13 @@ Answer = tuple[str, float, float, str]
 
 def best(work: Callable[[int], object], calls: int = CALLS) -> float:
     """Least processor time of a call [ms] over several rounds; every call has a number that none had before."""
-    numbers, least = count(), float("inf")
+    numbers, lowest = count(), float("inf")
     for _ in range(ROUNDS):
         began = time.process_time()
         for _ in range(calls):
             work(next(numbers))
-        least = min(least, (time.process_time() - began) / calls)
-    return 1e3 * least
+        lowest = min(lowest, (time.process_time() - began) / calls)
+    return 1e3 * lowest
 
 
 def compiled() -> Callable[..., Array] | None:
@@ -124,14 +124,14 @@ def force_times(engine: Engine, point: OperatingPoint) -> dict[str, float]:
     """Milliseconds of the forces over the cycle, by what computes them."""
     plain, loops = plain_engine(engine, point, SAMPLES), compiled()
     ratio, speed = engine.slider_cranks[0].rod_ratio, point.speed
-    own = own_forces(engine, point)
+    package = own_forces(engine, point)
     answers = [plain.forces(ratio, speed), plain.kept(ratio)(speed)]
     answers += [] if loops is None else [by_numba(loops, plain, ratio, speed)]
     for answer in answers:
-        assert np.abs(answer - own).max() < AGREES * np.abs(own).max()
-    kept = plain.kept(ratio)
+        assert np.abs(answer - package).max() < AGREES * np.abs(package).max()
+    with_orders = plain.kept(ratio)
     times = {"NumPy, everything anew": best(lambda k: plain.forces(ratio + 1e-6 * k, speed))}
-    times["NumPy, new speed, rest kept"] = best(lambda k: kept(speed + 1e-4 * k))
+    times["NumPy, new speed, rest kept"] = best(lambda k: with_orders(speed + 1e-4 * k))
     times["numba, everything anew"] = (
         MISSING if loops is None else best(lambda k: by_numba(loops, plain, ratio + 1e-6 * k, speed))
     )
@@ -240,17 +240,17 @@ def crank_times() -> list[Answer]:
     unit = (
         part.reciprocating_mass * part.crank_radius * point.speed**2 * abs(problem.engine.slider_cranks[1].x - part.x)
     )
-    own = result.objective.value / unit
-    assert abs(float(every(0)) / own - 1.0) < AGREES
+    package = result.objective.value / unit
+    assert abs(float(every(0)) / package - 1.0) < AGREES
     rows = [
         (f"NumPy, all {math.factorial(THROWS - 1):,} stars", best(every, 1), float(every(0)), "enumeration"),
-        ("`laufruhe.solve`, from the problem", best(lambda _: laufruhe.solve(problem), 1), own,
+        ("`laufruhe.solve`, from the problem", best(lambda _: laufruhe.solve(problem), 1), package,
          f"{result.certificate.kind}, gap {result.certificate.gap:.0e}"),
     ]  # fmt: skip
     if CP_MODEL is None:
         return [*rows, ("CP-SAT", MISSING, MISSING, "")]
     star, proof = by_cp_sat(CP_MODEL, couples)
-    assert value(star) / own - 1.0 < AGREES_IN_INTEGERS
+    assert value(star) / package - 1.0 < AGREES_IN_INTEGERS
     return [*rows, ("CP-SAT, one worker", best(lambda _: by_cp_sat(CP_MODEL, couples), 1), float(value(star)), proof)]
 
 

@@ -57,12 +57,12 @@ def general(affines: list[AffineProblem], evolve: bool) -> list[float]:
         if evolve:
             disc = NonlinearConstraint(room, 0.0, np.inf)
             bounds = [(-1.0, 1.0)] * width
-            found = differential_evolution(objective, bounds, constraints=disc, seed=1, maxiter=100, polish=False)
+            optimum = differential_evolution(objective, bounds, constraints=disc, seed=1, maxiter=100, polish=False)
         else:
             inside = {"type": "ineq", "fun": room}
             start = np.full(width, 0.05)
-            found = minimize(objective, start, method="SLSQP", constraints=[inside], options={"maxiter": 300})
-        values.append(float(found.fun))
+            optimum = minimize(objective, start, method="SLSQP", constraints=[inside], options={"maxiter": 300})
+        values.append(float(optimum.fun))
     return values
 
 
@@ -148,8 +148,8 @@ def main() -> None:
     unit = rows[0][1] / POINTS
     for k, (name, seconds, values, count) in enumerate(rows):
         above = 100.0 * (values / bounds[-count:] - 1.0)
-        shown = "- | -" if k == 0 else f"{above.mean():.2g} | {above.max():.2g}"
-        lines.append(f"| {name} | {1e3 * seconds / count:.1f} | {seconds / count / unit:.2f} | {shown} |")
+        excess = "- | -" if k == 0 else f"{above.mean():.2g} | {above.max():.2g}"
+        lines.append(f"| {name} | {1e3 * seconds / count:.1f} | {seconds / count / unit:.2f} | {excess} |")
     lines += [
         "",
         "## A study, point by point",

@@ -55,7 +55,7 @@ def viscous(engine: Engine) -> Engine:
     return engine.with_extra(replace(chain, sections=sections))
 
 
-def beside() -> list[str]:
+def comparison_rows() -> list[str]:
     """Natural modes, and the response of every order at one speed, ours and theirs."""
     problem = laufruhe.load(PROBLEM)
     engine, point = viscous(problem.engine), problem.points[1]
@@ -73,12 +73,12 @@ def beside() -> list[str]:
     ours, other = twist(engine, point).coefficients[1:], their_response()
     differs = np.abs(ours - other).max() / np.abs(other).max()
     rows = []
-    for what, own, their, apart in (
+    for what, package, their, difference in (
         ("natural modes", lambda: natural_modes(chain_of(engine)), theirs.undamped_modal_analysis, modes),
         (f"response in {len(orders)} orders", lambda: twist(engine, point), their_response, differs),
     ):
-        a, b = 1e3 * seconds(own), 1e3 * seconds(their)
-        rows.append(f"| {what} | {a:.2f} | {b:.2f} | {b / a:.1f} | {apart:.0e} |")
+        a, b = 1e3 * seconds(package), 1e3 * seconds(their)
+        rows.append(f"| {what} | {a:.2f} | {b:.2f} | {b / a:.1f} | {difference:.0e} |")
     return rows
 
 
@@ -113,7 +113,7 @@ def main() -> None:
         "",
         "| what | Laufruhe [ms] | openTorsion [ms] | ratio | apart |",
         "| --- | ---: | ---: | ---: | ---: |",
-        *beside(),
+        *comparison_rows(),
         "",
         "## Firing orders against torsion",
         "",

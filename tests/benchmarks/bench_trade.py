@@ -48,7 +48,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report.document import Bullets, Document, Paragraph
 from problem_files import PROBLEMS
 
-SHOWN = (
+LISTED = (
     RIGID, NO_GAS, TWO_ORDER, "orders to 4, 96 steps", "orders to 8, 192 steps", "orders to 24, 360 steps",
     "exact, 720 steps", "auto 0.01", "auto 0.001", "auto 0.0001",
 )  # fmt: skip
@@ -59,7 +59,7 @@ COMPARED = (
 WORDS = {"evaluation": "evaluate", "solve": "solve", "scene": "scene of a sweep", "batch": "10,000 designs"}
 AUTO = {"kinematics": "auto", "tolerance": 1e-3}
 ROUNDS = 3
-LEAST, BEYOND = 1e-8, 20.0
+LOWEST, BEYOND = 1e-8, 20.0
 """What is under it is drawn at it; and where designs beyond a limit are."""
 
 
@@ -68,14 +68,14 @@ def draw(trades: list[dict[str, Any]]) -> None:
     style = importlib.import_module("laufruhe.plots.style")
     drawn = style.page(1, 2, (3.5, 3.6), across=0.3)
     rows = [row for trade in trades for row in trade["rows"]]
-    shown = [name for name in SHOWN if any(row["name"] == name for row in rows)]
+    labels = [name for name in LISTED if any(row["name"] == name for row in rows)]
     for axes, key, name in zip(drawn.panels, ("error", "regret"), ("error of the objective", "regret"), strict=True):
-        for k, fidelity in enumerate(shown):
-            own = [row for row in rows if row["name"] == fidelity and row[key] is not None]
-            broken = [row for row in own if key == "regret" and row["excess"] > KEEPS]
-            values = np.sort([max(row[key], LEAST) for row in own if row not in broken])
-            apart = 0.6 * (np.random.default_rng(k).random(len(values)) - 0.5)
-            axes.scatter(values, k + apart, s=9, color=style.BLUE, alpha=0.45, linewidths=0.0, zorder=3)
+        for k, fidelity in enumerate(labels):
+            points = [row for row in rows if row["name"] == fidelity and row[key] is not None]
+            broken = [row for row in points if key == "regret" and row["excess"] > KEEPS]
+            values = np.sort([max(row[key], LOWEST) for row in points if row not in broken])
+            jitter = 0.6 * (np.random.default_rng(k).random(len(values)) - 0.5)
+            axes.scatter(values, k + jitter, s=9, color=style.BLUE, alpha=0.45, linewidths=0.0, zorder=3)
             if len(values):
                 middle = float(np.median(values))
                 axes.plot([middle, middle], [k - 0.36, k + 0.36], color=style.VERMILION, lw=1.8, zorder=4)
@@ -83,12 +83,12 @@ def draw(trades: list[dict[str, Any]]) -> None:
                 axes.annotate(
                     f"x {len(broken)}", (BEYOND, k), va="center", ha="center", fontsize=8, backgroundcolor="white"
                 )
-        axes.set(xscale="log", xlabel=name, yticks=range(len(shown)), ylim=(len(shown) - 0.5, -0.5))
-        axes.set_xlim(0.5 * LEAST, 60.0)
+        axes.set(xscale="log", xlabel=name, yticks=range(len(labels)), ylim=(len(labels) - 0.5, -0.5))
+        axes.set_xlim(0.5 * LOWEST, 60.0)
         axes.set_xticks([10.0**power for power in range(-8, 2, 2)])
         axes.set_xticklabels(["under 1e-8", "1e-6", "1e-4", "1 %", "100 %"])
         axes.minorticks_off()
-    drawn.panels[0].set_yticklabels(shown)
+    drawn.panels[0].set_yticklabels(labels)
     drawn.panels[1].set_yticklabels([])
     text = (
         f"A dot: one of {len(trades)} ready problems; a bar: the middle of them. "
@@ -124,11 +124,11 @@ def call_times() -> Iterator[tuple[str, str, float, float]]:
         scale, batch = Reference(problem), Batch(problem)
         (variant,) = (variant for rung, variant in ladder(scale) if rung == "auto 0.001")
         calls: dict[str, Callable[[], float]] = {
-            "evaluation": lambda own=variant: min(spent(lambda: laufruhe.evaluate(own)) for _ in range(30)),
-            "solve": lambda own=variant: min(spent(lambda: laufruhe.solve(own)) for _ in range(3)),
-            "scene": lambda own=problem: scene_time(own),
-            "batch": lambda own=variant, b=batch: min(
-                spent(lambda: laufruhe.evaluate_many(own, b.columns)) for _ in range(3)
+            "evaluation": lambda one=variant: min(spent(lambda: laufruhe.evaluate(one)) for _ in range(30)),
+            "solve": lambda one=variant: min(spent(lambda: laufruhe.solve(one)) for _ in range(3)),
+            "scene": lambda one=problem: scene_time(one),
+            "batch": lambda one=variant, b=batch: min(
+                spent(lambda: laufruhe.evaluate_many(one, b.columns)) for _ in range(3)
             ),
         }
         rounds = [
@@ -264,9 +264,9 @@ def main() -> None:
     """Measure, and keep the table alone."""
     started, before = time.perf_counter(), processor_seconds()
     with ProcessPoolExecutor(processors()) as pool:
-        trades = [own for own in pool.map(of_problem, SOLVED) if own is not None]
+        trades = [trade for trade in pool.map(of_problem, SOLVED) if trade is not None]
     seconds, total = time.perf_counter() - started, processor_seconds() - before
-    rows = [json.loads(report.as_json(own)) for own in trades]
+    rows = [json.loads(report.as_json(trade)) for trade in trades]
     made = f"Made in {seconds:.0f} s with {processors()} processes, which took {total:.0f} s of a processor together."
     picture = "![Error and regret of the usual fidelities over all ready problems](trade.png)"
     head, table = index(trades).as_markdown("").split("\n\n| ", 1)

@@ -50,7 +50,7 @@ def _ended(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def told(status: int | None, said: str, seconds: float, limit: float) -> str:
+def verdict_text(status: int | None, said: str, seconds: float, limit: float) -> str:
     """What became of a script, in a line."""
     if status is None:
         return f"FAILED: took longer than {limit:.0f} s"
@@ -65,16 +65,16 @@ def main() -> int:
     parser.add_argument("only", nargs="*", metavar="name", help=", ".join(SCRIPTS))
     parser.add_argument("--without", nargs="+", choices=SCRIPTS, default=[], metavar="name")
     parser.add_argument("--limit", type=float, default=LIMIT, help=f"seconds for each script, {LIMIT:.0f} by itself")
-    given = parser.parse_args()
-    if unknown := set(given.only) - SCRIPTS.keys():
+    arguments = parser.parse_args()
+    if unknown := set(arguments.only) - SCRIPTS.keys():
         parser.error(f"there is no {', '.join(sorted(unknown))}; there are {', '.join(SCRIPTS)}")
-    names = [name for name in given.only or SCRIPTS if name not in given.without]
+    names = [name for name in arguments.only or SCRIPTS if name not in arguments.without]
     began, failed = time.perf_counter(), 0
     for k, name in enumerate(names, 1):
         print(f"[{k}/{len(names)}] {name} ... ", end="", flush=True)
         started = time.perf_counter()
-        status, said = run(SCRIPTS[name], given.limit)
-        print(told(status, said, time.perf_counter() - started, given.limit), flush=True)
+        status, said = run(SCRIPTS[name], arguments.limit)
+        print(verdict_text(status, said, time.perf_counter() - started, arguments.limit), flush=True)
         if status not in (0, SKIPPED):
             failed += 1
             print(said, flush=True)

@@ -15,8 +15,8 @@ def main(path: str, port: int) -> None:
     import numpy as np
     from dash import Dash, Input, Output, dcc, html
 
-    kept = np.load(path)
-    fixed, columns, start = kept["fixed"], kept["columns"], kept["start"]
+    model = np.load(path)
+    fixed, columns, start = model["fixed"], model["columns"], model["start"]
     degrees = np.linspace(0.0, 720.0, fixed.shape[1], endpoint=False)
     app = Dash("live", serve_locally=True)
     ranges = [
@@ -28,7 +28,7 @@ def main(path: str, port: int) -> None:
 
     @app.callback(
         *(Output(graph.id, "figure") for graph in graphs), Output("value", "children"),
-        *(Input(each.id, "value") for each in ranges),
+        *(Input(slider.id, "value") for slider in ranges),
     )  # fmt: skip
     def drawn(*x: Any) -> Any:
         forces = fixed + np.tensordot(np.asarray(x, dtype=float), columns, axes=1)

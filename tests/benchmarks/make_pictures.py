@@ -65,9 +65,9 @@ def live_page() -> None:
             page.locator("#live").evaluate("live => live.scrollIntoView()")
             pictures, times = zip(*_moves(page), strict=True)
     # one set of colours for all, or they would flicker
-    some = Image.fromarray(np.concatenate([np.asarray(each) for each in pictures[:: len(pictures) // 4]]))
+    some = Image.fromarray(np.concatenate([np.asarray(picture) for picture in pictures[:: len(pictures) // 4]]))
     colours = some.quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
-    frames = [each.quantize(palette=colours, dither=Image.Dither.NONE) for each in pictures]
+    frames = [picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures]
     path = PICTURES / "live-page.gif"
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=times, loop=0, optimize=True)
 
@@ -76,16 +76,16 @@ def _moves(page: Page) -> Iterator[tuple[Image.Image, int]]:
     """Every frame, and how long it stands [ms]."""
     best = page.evaluate("laufruheLive.page.then(page => page.design())")
     at = {**best, "left.unbalance": 0.0, "right.unbalance": 0.0}
-    yield _shown(page, at, None), 1200
+    yield _screenshot(page, at, None), 1200
     for name in ("left.unbalance", "right.unbalance"):
         # too far, and back
         for share in (*np.linspace(0.0, 1.5, STEPS)[1:], *np.linspace(1.5, 1.0, STEPS // 2)[1:]):
-            yield _shown(page, at | {name: share * best[name]}, name), 90
+            yield _screenshot(page, at | {name: share * best[name]}, name), 90
         at[name] = best[name]
-    yield _shown(page, best, None), 2400
+    yield _screenshot(page, best, None), 2400
 
 
-def _shown(page: Page, design: dict[str, float], name: str | None) -> Image.Image:
+def _screenshot(page: Page, design: dict[str, float], name: str | None) -> Image.Image:
     """The page with a design, the slider that is moved marked as it is under a hand."""
     page.evaluate(
         """async ({ design, name }) => {
@@ -117,8 +117,8 @@ def main() -> None:
                 [sys.executable, "-m", "laufruhe", command, problem, "--out", folder, "--format", "png"],
                 check=True,
             )
-            for drawn, kept in pictures.items():
-                shrunk(Path(folder) / f"{drawn}.png", PICTURES / f"{kept}.png")
+            for drawn, path in pictures.items():
+                shrunk(Path(folder) / f"{drawn}.png", PICTURES / f"{path}.png")
 
 
 if __name__ == "__main__":

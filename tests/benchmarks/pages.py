@@ -34,28 +34,30 @@ def spent(work: Callable[[], object]) -> float:
 def processor_seconds() -> float:
     """Of this process and of those that it has waited for."""
     both = (resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(each.ru_utime + each.ru_stime for each in both)
+    return sum(usage.ru_utime + usage.ru_stime for usage in both)
 
 
 def _busy_seconds() -> float:
     """Of all processors since the machine was started, whoever had them."""
-    told = psutil.cpu_times()._asdict()
+    times = psutil.cpu_times()._asdict()
     # what guests had is counted as user time too
-    return float(sum(told.values()) - sum(told.get(name, 0.0) for name in ("idle", "iowait", "guest", "guest_nice")))
+    return float(sum(times.values()) - sum(times.get(name, 0.0) for name in ("idle", "iowait", "guest", "guest_nice")))
 
 
-_BEGAN, _BUSY, _OWN = time.perf_counter(), _busy_seconds(), processor_seconds()
+_BEGAN, _BUSY, _USED = time.perf_counter(), _busy_seconds(), processor_seconds()
 
 
 def _machine() -> str:
     """What made the page, on what machine, and how busy that was with other work."""
-    elapsed, own = time.perf_counter() - _BEGAN, processor_seconds() - _OWN
-    others = max(_busy_seconds() - _BUSY - own, 0.0) / elapsed
+    elapsed, own_seconds = time.perf_counter() - _BEGAN, processor_seconds() - _USED
+    others = max(_busy_seconds() - _BUSY - own_seconds, 0.0) / elapsed
     words = " ".join(["python", f"tests/benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]])
-    made = f"Made by `{words}` in {elapsed:.0f} s, {own:.0f} s of a processor, "
+    made = f"Made by `{words}` in {elapsed:.0f} s, {own_seconds:.0f} s of a processor, "
     made += f"with Python {platform.python_version()} on {platform.machine()}."
-    told = "too little to disturb" if others < QUIET else "which makes times longer, those by the clock most"
-    load = f"Load of the machine meanwhile: other programs had {others:.1f} of its {os.cpu_count()} processors, {told}."
+    effect = "too little to disturb" if others < QUIET else "which makes times longer, those by the clock most"
+    load = (
+        f"Load of the machine meanwhile: other programs had {others:.1f} of its {os.cpu_count()} processors, {effect}."
+    )
     return f"{made} {load}"
 
 

@@ -53,11 +53,11 @@ def answered(path: Path) -> Answer:
     seconds = time.process_time() - began
     proof, objective = result.certificate, result.objective
     value, unit = (objective.value, objective.unit) if objective is not None else (math.nan, "")
-    told = (proof.lower_bound, proof.gap, str(proof.kind)) if proof is not None else (math.nan, math.nan, "")
-    return Answer(path.stem, str(result.status), value, unit, *told, seconds)
+    proof_cells = (proof.lower_bound, proof.gap, str(proof.kind)) if proof is not None else (math.nan, math.nan, "")
+    return Answer(path.stem, str(result.status), value, unit, *proof_cells, seconds)
 
 
-def asked(path: Path) -> Answer:
+def answer_of(path: Path) -> Answer:
     """In a process of its own, that cannot start others on further processors."""
     if hasattr(os, "sched_getaffinity"):
         one = {max(os.sched_getaffinity(0))}
@@ -80,7 +80,7 @@ def ready() -> list[Path]:
     return [path for path in paths if "study" not in tomllib.loads(path.read_text(encoding="utf-8"))]
 
 
-def kept(path: Path) -> dict[str, Answer]:
+def saved_answers(path: Path) -> dict[str, Answer]:
     """A table of an earlier version."""
     if not path.exists():
         return {}
@@ -105,11 +105,12 @@ def page(answers: list[Answer], before: dict[str, Answer]) -> str:
     counts = {kind: sum(a.kind == kind for a in proven) for kind in KINDS}
     both = [(before[a.name], a) for a in proven if a.name in before and before[a.name].kind]
     now, then = sum(a.seconds for _, a in both), sum(b.seconds for b, _ in both)
-    told = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
+    counted_kinds = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     lines = [
         "# What is proven of the ready problems",
         "",
-        f"Of {len(answers)} problems {len(proven)} have something open that has a proof: {told}. `global` says that no",
+        f"Of {len(answers)} problems {len(proven)} have something open that has a proof: "
+        f"{counted_kinds}. `global` says that no",
         "design is better by more than the tolerance that the problem asks for (a thousandth unless it says so),",
         "`global within gap` that none is better by more than the gap, `local` that the bound is far from the value.",
         "Values and bounds in SI; processor seconds of one process, libraries loaded before, beside those of",
@@ -122,8 +123,8 @@ def page(answers: list[Answer], before: dict[str, Answer]) -> str:
     for a in proven:
         b = before.get(a.name)
         earlier = f"{number(b.bound)} | {share(b.gap)} | {b.seconds:.2f}" if b is not None and b.kind else "- | - | -"
-        own = f"{number(a.value)} {a.unit} | {number(a.bound)} | {share(a.gap)} | {a.kind} | {a.seconds:.2f}"
-        lines.append(f"| {a.name} | {own} | {earlier} |")
+        cells = f"{number(a.value)} {a.unit} | {number(a.bound)} | {share(a.gap)} | {a.kind} | {a.seconds:.2f}"
+        lines.append(f"| {a.name} | {cells} | {earlier} |")
     rest = ", ".join(a.name for a in answers if not a.kind)
     return "\n".join([*lines, "", f"Without a proof, for nothing is open or nothing is minimised: {rest}.", ""])
 
@@ -144,19 +145,19 @@ def main() -> None:
     parser.add_argument("--solve", type=Path)
     parser.add_argument("--keep")
     parser.add_argument("--only", nargs="*", default=[])
-    given = parser.parse_args()
-    if given.solve is not None:
-        print(json.dumps(asdict(answered(given.solve))))
+    arguments = parser.parse_args()
+    if arguments.solve is not None:
+        print(json.dumps(asdict(answered(arguments.solve))))
         return
-    path = FOLDER / f"{given.keep or 'now'}.csv"
-    known = kept(path) if given.only else {}
+    path = FOLDER / f"{arguments.keep or 'now'}.csv"
+    known = saved_answers(path) if arguments.only else {}
     for problem in ready():
-        if not given.only or problem.stem in given.only:
-            known[problem.stem] = asked(problem)
+        if not arguments.only or problem.stem in arguments.only:
+            known[problem.stem] = answer_of(problem)
             print(known[problem.stem], flush=True)
             write(path, sorted(known.values(), key=lambda a: a.name))
-    if given.keep is None:
-        text = page(sorted(known.values(), key=lambda a: a.name), kept(FOLDER / f"{BEFORE}.csv"))
+    if arguments.keep is None:
+        text = page(sorted(known.values(), key=lambda a: a.name), saved_answers(FOLDER / f"{BEFORE}.csv"))
         (FOLDER / "README.md").write_text(text, encoding="utf-8")
 
 

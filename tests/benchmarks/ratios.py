@@ -63,12 +63,12 @@ def neighbours(forces: Mapping[str, float], designs: Mapping[str, float]) -> Ite
 
 
 def _cones() -> Iterator[Row]:
-    beside = "cone programs of all rows and columns"
-    count, own, other = ready_times()
-    yield f"cone step of {count} ready problems with open unbalances alone", beside, "1", f"{own / other:.2f}"
+    rival = "cone programs of all rows and columns"
+    count, package, other = ready_times()
+    yield f"cone step of {count} ready problems with open unbalances alone", rival, "1", f"{package / other:.2f}"
     for size in LARGE:
-        own, other = (min(run[0] for run in runs) for runs in zip(*_large(size), strict=True))
-        yield f"the same of {size}", beside, "1", f"{own / other:.2f}"
+        package, other = (min(run[0] for run in runs) for runs in zip(*_large(size), strict=True))
+        yield f"the same of {size}", rival, "1", f"{package / other:.2f}"
 
 
 def _large(size: str) -> Iterator[list[list[float]]]:
@@ -108,24 +108,24 @@ def _commands() -> Iterator[Row]:
     commands = (("check", READS, "2.6"), ("solve", DRAWS, "3.9"))
     with TemporaryDirectory() as compiled:
         for command, imports, first in commands:
-            own, other = in_turns(
+            package, other = in_turns(
                 partial(seconds, [sys.executable, "-m", "laufruhe", command, str(PROBLEM)], compiled),
                 partial(seconds, [sys.executable, "-c", imports], compiled),
                 5,
             )
             what = f"`laufruhe {command}`" + (" with pictures" if command == "solve" else "")
-            yield f"{what}, {PROBLEM.stem}", NAMES[imports], first, f"{own[0] / other[0]:.2f}"
+            yield f"{what}, {PROBLEM.stem}", NAMES[imports], first, f"{package[0] / other[0]:.2f}"
 
 
 def _threads() -> Iterator[Row]:
     free = {name: value for name, value in os.environ.items() if name not in ONE_THREAD}
     for name in THREADED:
         command = [sys.executable, "-c", SOLVES, str(PROBLEMS / f"{name}.toml")]
-        own, one = (
+        package, one = (
             json.loads(subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout)
             for environment in (free, free | ONE_THREAD)
         )
-        yield f"`laufruhe.solve` from Python, {name}", "one BLAS thread", "1.6 to 3.3", f"{own / one:.2f}"
+        yield f"`laufruhe.solve` from Python, {name}", "one BLAS thread", "1.6 to 3.3", f"{package / one:.2f}"
 
 
 def _robust() -> Row:
@@ -149,5 +149,5 @@ def _random_designs() -> Row:
             clusters.prepared(Path(folder) / f"{draws}", draws=draws, chunk=10_000, scenes=1, points=2)
             for draws in (100_000, 200_000)
         ]
-        few, many = (timed(study, "--jobs", "1")[1] for study in studies)
-    return "study of 100,000 random designs", "of 200,000", "3.1", f"{few / many:.2f}"
+        short, many = (timed(study, "--jobs", "1")[1] for study in studies)
+    return "study of 100,000 random designs", "of 200,000", "3.1", f"{short / many:.2f}"

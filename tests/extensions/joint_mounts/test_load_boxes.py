@@ -12,7 +12,7 @@ import pytest
 
 import laufruhe
 from attack.families import problem as random_problem
-from attack.own_problem import Own
+from attack.own_problem import OwnModel
 from lanes import first_fast
 from laufruhe.extensions.joint_mounts.load_boxes import LoadBoxes, is_boxed, load_bounds
 from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
@@ -72,7 +72,7 @@ ONE_NUMBER = ["one-damper-over-41-speeds", "one-stiffness-under-transmissibility
 @pytest.mark.parametrize("name", first_fast(ONE_NUMBER, 0, 1))
 def test_one_open_number_is_bounded_by_few_boxes(name: str) -> None:
     path = INPUTS / f"{name}.toml"
-    problem, own = laufruhe.load(path), Own(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    problem, own = laufruhe.load(path), OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
     ((low, high),) = own.box
     designs = own.designs(np.linspace(low, high, 61)[:, None])
     objective = np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf)
@@ -88,7 +88,7 @@ def test_one_open_number_is_bounded_by_few_boxes(name: str) -> None:
 @pytest.mark.slow
 def test_a_transmissibility_limit_takes_the_boxes_where_it_is_broken() -> None:
     path = INPUTS / "one-stiffness-under-transmissibility.toml"
-    problem, own = laufruhe.load(path), Own(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    problem, own = laufruhe.load(path), OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
     (limit,) = problem.limits
     ((low, high),) = own.box
     x = np.linspace(low, high, 201)
@@ -108,7 +108,7 @@ def test_a_share_of_the_boxes_is_divided_first() -> None:
     path = INPUTS / "one-stiffness-under-transmissibility.toml"
     problem = laufruhe.load(path)
     problem = replace(problem, search=replace(problem.search, boxes=40))
-    own = Own(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    own = OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
     ((low, high),) = own.box
     designs = own.designs(np.linspace(low, high, 61)[:, None])
     minimum = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import laufruhe
-from attack.own_problem import Own
+from attack.own_problem import OwnModel
 from laufruhe.extensions.joint_mounts.load_boxes import LoadBoxes
 from laufruhe.extensions.joint_mounts.mounted_loads import OpenThrows, along_arcs, throws_at
 from laufruhe.problem.phasing import Candidate
@@ -51,10 +51,10 @@ def throws_of(table: dict[str, Any]) -> OpenThrows:
     return found
 
 
-def own_at(table: dict[str, Any], throws: np.ndarray) -> Own:
+def own_at(table: dict[str, Any], throws: np.ndarray) -> OwnModel:
     closed = copy.deepcopy(table)
     closed["engine"]["throws"] = [float(angle) for angle in np.degrees(throws)]
-    return Own(closed, 1440)
+    return OwnModel(closed, 1440)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import laufruhe
-from attack.own_problem import Own
+from attack.own_problem import OwnModel
 from laufruhe.extensions.joint_mounts import prover
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
@@ -20,8 +20,8 @@ from prove.test_provers import FORCE
 INPUTS = Path(__file__).parents[2] / "claims" / "inputs"
 
 
-def own_of(name: str) -> Own:
-    return Own(tomllib.loads((INPUTS / f"{name}.toml").read_text(encoding="utf-8")), 256)
+def own_of(name: str) -> OwnModel:
+    return OwnModel(tomllib.loads((INPUTS / f"{name}.toml").read_text(encoding="utf-8")), 256)
 
 
 @pytest.mark.slow

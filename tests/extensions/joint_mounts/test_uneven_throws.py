@@ -9,7 +9,7 @@ import pytest
 
 import laufruhe
 from attack.own_judge import vector
-from attack.own_problem import Own
+from attack.own_problem import OwnModel
 from lanes import first_fast
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result
@@ -21,11 +21,11 @@ def told(norm: str = "rms") -> dict[str, Any]:
     return {**tomllib.loads(PATH.read_text(encoding="utf-8")), "objective": {"minimise": f"{norm} mount force"}}
 
 
-def own_at(throw: float, norm: str = "rms") -> Own:
+def own_at(throw: float, norm: str = "rms") -> OwnModel:
     """Return the model of the second throw at an angle [deg]."""
     table = told(norm)
     table["engine"]["throws"] = [0, throw]
-    return Own(table, 256)
+    return OwnModel(table, 256)
 
 
 def decided(found: Result) -> tuple[float, np.ndarray]:
