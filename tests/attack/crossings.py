@@ -115,7 +115,7 @@ def motion_frequency_and_stiffness(rng: Generator) -> Table:
     """Stiffness under a limit on the frequency of a motion, which no bound knows."""
     table = scene(rng, 2, True)
     open_numbers(rng, table, ["stiffness"] * int(rng.integers(1, 4)))
-    table["objective"] = objective(asked_load(rng, table))
+    table["objective"] = objective(random_load(rng, table))
     motion = str(rng.choice(["roll", "bounce", "pitch", "lateral"]))
     limit = at_a_share(rng, table, {"quantity": "motion frequencies", "motions": [motion]})
     return {**table, "constraints": [limit], "search": {"starts": 5}}
