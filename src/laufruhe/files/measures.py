@@ -144,8 +144,14 @@ class MeasureContext:
     def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
         """Return the measure of a quantity with the keys of its table, checked for this engine."""
         if name not in MEASURES:
-            homes = [home for channel, home in HOMES["channels"].items() if name.endswith(channel)]
-            homes += [home for norm, home in HOMES["norms"].items() if name.startswith(norm)]
+            adders = [
+                *((text, home, str.endswith) for text, home in HOMES["channels"].items()),
+                *((text, home, str.startswith) for text, home in HOMES["norms"].items()),
+            ]
+            homes = [
+                home for text, home, has in adders
+                if has(name, text) and not any(has(known, text) for known in MEASURES)
+            ]  # fmt: skip
             if homes:
                 raise Refused(where, name, *missing_extension(homes[0]))
             usual = _HIGHEST.sub("maximum", name)

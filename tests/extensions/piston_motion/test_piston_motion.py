@@ -59,6 +59,7 @@ def test_scotch_yoke_is_a_sine() -> None:
 def test_dead_centres_of_a_slider_crank(rod_ratio: float) -> None:
     motion = piston_motion(slider_crank(rod_ratio), SPEED)
     assert motion.towards_crank.value == pytest.approx(0.04 * SPEED**2 * (1.0 + rod_ratio), rel=1e-11)
+    assert motion.towards_crank.angle == pytest.approx(0.0, abs=1e-7)
     assert motion.from_crank.value == pytest.approx(0.04 * SPEED**2 * (1.0 - rod_ratio), rel=1e-6)
 
 
@@ -177,6 +178,7 @@ def test_a_limit_that_no_throw_moves_keeps_the_proof() -> None:
     ("tables", "said"),
     [
         (file(objective={"minimise": "piston speeds"}), "is no quantity; did you mean 'piston speed'?"),
+        (file(objective={"minimise": "maximum piston speed"}), "is no quantity; did you mean"),
         (file(constraints=[{"limit": "piston speed", "min": "2 m/s"}]), "cannot stand beside piston speed"),
         (file(constraints=[{"limit": "rod angle", "max": "2 m"}]), "is not a unit of an angle"),
         (

@@ -103,7 +103,7 @@ def _largest(values: Array) -> Extreme:
     before, top, after = (float(values[(k + j) % len(values)]) for j in (-1, 0, 1))
     curvature = before - 2.0 * top + after
     shift = 0.5 * (before - after) / curvature if curvature < 0.0 else 0.0
-    return Extreme(top - 0.25 * (before - after) * shift, (k + shift) * math.tau / len(values) % math.tau)
+    return Extreme(top - 0.25 * (before - after) * shift, _since((k + shift) * math.tau / len(values), math.tau))
 
 
 def reversals(side_force: Spectrum, parts: Sequence[SliderCrank], point: OperatingPoint) -> list[list[Extreme]]:
@@ -143,9 +143,14 @@ def reversals(side_force: Spectrum, parts: Sequence[SliderCrank], point: Operati
     by_piston: list[list[Extreme]] = [[] for _ in parts]
     for angle, piston, rate in zip(angles.tolist(), pistons.tolist(), rates.tolist(), strict=True):
         part = parts[piston]
-        since = abs(part.shaft.ratio) * ((angle - _top(part) + _SIDE) % side_force.period)
-        by_piston[piston].append(Extreme(rate, since))
+        since = _since(angle - _top(part), side_force.period)
+        by_piston[piston].append(Extreme(rate, abs(part.shaft.ratio) * since))
     return [sorted(events, key=lambda event: event.angle) for events in by_piston]
+
+
+def _since(angle: float, period: float) -> float:
+    # rounding puts no angle just below the period
+    return max((angle + _SIDE) % period - _SIDE, 0.0)
 
 
 def _slopes(signal: Spectrum, angles: Array) -> Array:
