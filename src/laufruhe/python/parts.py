@@ -304,12 +304,12 @@ class EngineParts(Parts):
         return self._with("running_gear", "running_gear", keys_of(locals()))
 
     def speed_range(
-        self, name: str, *, speed: Number, up_to: Number, mounts: Sequence[str] | None = None,
-        bearings: Sequence[str] | None = None, cylinders: Sequence[str] | None = None,
-        sections: Sequence[str] | None = None, webs: Sequence[str] | None = None,
-        receivers: Sequence[str] | None = None, electric_machines: Sequence[str] | None = None,
-        operating_points: Sequence[str] | None = None, orders: Values | None = None, alternating: bool | None = None,
-        direction_weights: Values | None = None, load_cases: Sequence[str] | None = None,
+        self, name: str, *, speeds: Values, mounts: Sequence[str] | None = None, bearings: Sequence[str] | None = None,
+        cylinders: Sequence[str] | None = None, sections: Sequence[str] | None = None,
+        webs: Sequence[str] | None = None, receivers: Sequence[str] | None = None,
+        electric_machines: Sequence[str] | None = None, operating_points: Sequence[str] | None = None,
+        orders: Values | None = None, alternating: bool | None = None, direction_weights: Values | None = None,
+        load_cases: Sequence[str] | None = None,
         motions: Sequence[Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]] | None = None,
         wanted: Number | None = None, frequency: Value | None = None, operating_point: str | None = None,
         quantity: QuantityName | None = None, minimise: bool | None = None,

@@ -15,7 +15,9 @@ from scipy.optimize import minimize
 import laufruhe
 from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.speed_ranges.peaks import Response
+from laufruhe.extensions.speed_ranges.picture import figure
 from laufruhe.extensions.speed_ranges.ranges import SpeedRanges
+from laufruhe.extensions.speed_ranges.section import SECTION
 from laufruhe.extensions.worst_mean.norm import WorstRms
 from laufruhe.numerics.norms import RMS, Grid
 from laufruhe.problem.evaluation import evaluate
@@ -73,8 +75,7 @@ orders = 4
 minimise = "rms receiver acceleration"
 [[speed_ranges]]
 name = "all"
-speed = "1500 rpm"
-up_to = "7000 rpm"
+speeds = ["1500 rpm", "7000 rpm"]
 """
 
 
@@ -142,6 +143,7 @@ def own_values(problem: laufruhe.Problem, speeds: NDArray[np.float64]) -> NDArra
     return np.sqrt(total)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_no_speed_of_a_hundred_thousand_exceeds_the_peak(seed: int, tmp_path: Path) -> None:
     problem, response = found(written(tmp_path, seed=seed))
@@ -173,6 +175,7 @@ def rows_at(problem: laufruhe.Problem, speeds: NDArray[np.float64]) -> NDArray[n
     return forms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_the_design_for_a_range_is_that_of_scipy(seed: int, tmp_path: Path) -> None:
     """SLSQP minimises the largest of many speeds, close together near the peaks: no value or bound is beyond it."""
@@ -206,6 +209,7 @@ def test_the_design_for_a_range_is_that_of_scipy(seed: int, tmp_path: Path) -> N
     assert own_values(replace(problem, engine=engine), speeds).max() <= result.objective.value * (1.0 + 1e-6)
 
 
+@pytest.mark.slow
 def test_a_curve_holds_at_every_speed(tmp_path: Path) -> None:
     """The limit of a CSV file is active, and no speed between those of the program violates it."""
     free = laufruhe.solve(laufruhe.load(written(tmp_path)))
@@ -224,6 +228,16 @@ def test_a_curve_holds_at_every_speed(tmp_path: Path) -> None:
     assert (values / limits).max() == pytest.approx(1.0, abs=2e-5)
     ratio = result.details.final[0].ratio  # type: ignore[union-attr]
     assert ratio == pytest.approx((values / limits).max(), rel=1e-5)
+    # report, files and picture show it
+    assert SECTION.record is not None
+    record = SECTION.record(result)["ranges"]["all"]
+    assert record["final"]["of_limit"] == ratio
+    assert record["final"]["worst"] == pytest.approx(values.max(), rel=1e-5)
+    (table,) = SECTION.tables(result)
+    assert [row[1] for row in table.rows] == ["initial", "final"]
+    rows = SECTION.number_tables["over-speed-ranges"][1](result).rows
+    assert max(row[3] / row[4] for row in rows if row[1] == "final") == pytest.approx(ratio)
+    assert len(figure(result).axes) == 2
 
 
 def test_the_mean_has_the_shares_of_time(tmp_path: Path) -> None:
@@ -262,13 +276,14 @@ WRONG = {
     'operating_point = "town"\n': "speed_ranges[1].operating_point",
     'operating_points = ["road"]\n': "speed_ranges[1].operating_points",
     'max = [["3000 rpm", "1 m/s^2"], ["2000 rpm", "1 m/s^2"]]\n': "speed_ranges[1].max",
+    'receivers = ["grip"]\n': "speed_ranges[1].quantity",
     'max = "0 m/s^2"\n': "speed_ranges[1].max",
     'max = "5 mm/s"\n': "speed_ranges[1].max",
     'max = "none.csv"\n': "speed_ranges[1].max",
     'time_shares = [["3000 rpm", 0]]\n': "speed_ranges[1].time_shares",
-    'minimise = true\n[[speed_ranges]]\nname = "b"\nspeed = "2 rpm"\nup_to = "3 rpm"\nminimise = true\n':
+    'minimise = true\n[[speed_ranges]]\nname = "b"\nspeeds = ["2 rpm", "3 rpm"]\nminimise = true\n':
         "speed_ranges[2].minimise",
-    '[[speed_ranges]]\nname = "b"\nspeed = "3 rpm"\nup_to = "3 rpm"\n': "speed_ranges[2].up_to",
+    '[[speed_ranges]]\nname = "b"\nspeeds = ["3 rpm", "3 rpm"]\n': "speed_ranges[2].speeds",
 }  # fmt: skip
 
 

@@ -91,24 +91,39 @@ def solve_ranges(problem: Problem, decide: Callable[[Problem], Result], _: Calla
     start = evaluate_start(base)
     initial = tuple(Response(base, start, span) for span in ranges)
     speeds = {one.span.name: {one.span.low, one.span.high, *_tops(one)} for one in initial}
-    final, bound, rounds, result = initial, 0.0, 0, None
-    for rounds in timed_rounds(ROUNDS):  # noqa: B007
+    bound, rounds, best = 0.0, 0, None
+    for k in timed_rounds(ROUNDS):
         used = _sorted(speeds)
         report_progress("speeds of the ranges", sum(map(len, used.values())))
         result = decide(at_speeds(base, ranges, used))
-        if not result.status.has_design:
+        if not result.status.has_design and (best is None or result.status is Status.INFEASIBLE):
             return result
+        if not result.status.has_design:
+            break
+        rounds = k + 1
         if result.certificate is not None and result.certificate.kind is not Proof.NONE:
             bound = max(bound, result.certificate.lower_bound)
         final = tuple(Response(base, result.final, span) for span in ranges)
         added = [_violated_speeds(one, result) for one in final]
+        # a local method may have a worse design in a later round
+        if best is None or _rank(result, final) < _rank(*best[:2]):
+            best = result, final, used
         for one, tops in zip(final, added, strict=True):
             speeds[one.span.name].update(tops)
         if not any(added):
             break
-    if result is None:
+    if best is None:
         raise SolverError("no design for the speed ranges was found within the time limit; raise the time limit")
-    return _conclusion(base, ranges, used, result, bound, RangeResponses(initial, final, rounds + 1))
+    result, final, used = best
+    return _conclusion(base, ranges, used, result, bound, RangeResponses(initial, final, rounds))
+
+
+def _rank(result: Result, final: Sequence[Response]) -> tuple[float, float]:
+    # violation of limits over the ranges first, then the objective
+    violation = max((one.ratio for one in final), default=0.0)
+    values = [float(one.values[one.worst]) for one in final if one.span.minimised]
+    value = values[0] if values else result.objective.value if result.objective is not None else 0.0
+    return violation if violation > 1.0 + FEASIBILITY_TOL else 0.0, value
 
 
 def _sorted(speeds: Mapping[str, set[float]]) -> Speeds:

@@ -20,8 +20,6 @@ from laufruhe.problem.problem import Problem
 
 MAX_RANGES, MAX_PAIRS = 8, 1000
 _UNIT = re.compile(r"[\[(](.+?)[\])]")
-
-
 CurveField: TypeAlias = str | list[f.Pair[f.Side]]
 
 
@@ -29,8 +27,7 @@ class SpeedRangeTable(QuantityTable):
     """A range of crank speeds over which the worst value of a quantity is found, minimised or limited."""
 
     name: Name
-    speed: f.Speed = f.required("Lowest crank speed.")
-    up_to: f.Speed = f.required("Highest crank speed.")
+    speeds: f.Pair[f.Speed] = f.required("Lowest and highest crank speed.")
     operating_point: str | None = f.optional(
         "Operating point whose gas acts at every speed; by default the only one of the file."
     )
@@ -59,8 +56,9 @@ def _read(tables: Sequence[SpeedRangeTable], problem: Problem, context: Extensio
 
 
 def _range(table: SpeedRangeTable, problem: Problem, context: ExtensionContext, where: str) -> SpeedRange:
-    if table.speed >= table.up_to:
-        raise Refused(f"{where}.up_to", None, "is not above the lowest speed of the range", "give a higher one")
+    low, high = table.speeds
+    if low >= high:
+        raise Refused(f"{where}.speeds", None, "has its ends reversed", "write the lower speed first")
     names = [point.name for point in problem.points]
     if table.operating_point is None and len(names) > 1:
         rule = f"is missing, and the file has {len(names)} operating points"
@@ -78,6 +76,9 @@ def _range(table: SpeedRangeTable, problem: Problem, context: ExtensionContext, 
     if quantity not in MEASURES:
         raise Refused(f"{where}.quantity", quantity, "is no quantity", nearest(quantity, list(MEASURES)))
     measure = table.measure(quantity)
+    if table.quantity is None and measure != QuantityTable().measure(quantity):
+        rule = "is missing, and the range has keys that narrow it"
+        raise Refused(f"{where}.quantity", None, rule, "name the quantity, or narrow the objective")
     if not measure.is_load or "operating_points" not in measure.channel.keys:
         rule = "is no norm of a load, and has no value at each speed"
         raise Refused(f"{where}.quantity", quantity, rule, 'name one such as "rms mount force"')
@@ -88,11 +89,11 @@ def _range(table: SpeedRangeTable, problem: Problem, context: ExtensionContext, 
         )  # fmt: skip
         raise Refused(f"{where}.minimise", None, rule, "change the objective, and remove quantity")
     unit, limit = measure.unit, table.max
-    single = isinstance(limit, str) and not limit.lower().endswith(".csv")
+    if isinstance(limit, str) and not limit.lower().endswith(".csv"):
+        limit = [["1 rpm", limit]]
     return SpeedRange(
-        table.name, table.speed, table.up_to, point.name, None if table.quantity is None else measure, table.minimise,
-        _read_curve([["1 rpm", str(limit)]], unit, context, f"{where}.max") if single
-        else _read_curve(limit, unit, context, f"{where}.max"),
+        table.name, low, high, point.name, None if table.quantity is None else measure, table.minimise,
+        _read_curve(limit, unit, context, f"{where}.max"),
         _read_curve(table.time_shares, "", context, f"{where}.time_shares"),
         None if table.quantity is None else table, table.quantity or "",
     )  # fmt: skip
