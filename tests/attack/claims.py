@@ -39,7 +39,7 @@ SPARE = 2e-5
 
 @dataclass
 class Verdict:
-    """What came out of one problem.
+    """Outcome of one problem.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def solved(table: Table, folder: Path, name: str = "problem") -> Any:
 
 @contextlib.contextmanager
 def silence_heard(wrong: list[str]):
-    """What is printed or warned of meanwhile is a defect."""
+    """Count as a defect what is printed or warned of meanwhile."""
     heard = io.StringIO()
     with (
         warnings.catch_warnings(record=True) as caught,
@@ -211,7 +211,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
 
 
 def _size(table: Table) -> float:
-    """Of the loads of one piston at the highest speed, where loads are asked for [N, N m]."""
+    """Return the size of the loads of one piston at the highest speed [N, N m]; 1e-9 without loads."""
     if not any(word in term["quantity"] for term in terms_of(table) for word in ("force", "couple", "moment")):
         return 1e-9
     speed = max(number(point["speed"]) for point in table["operating_points"])

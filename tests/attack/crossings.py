@@ -147,7 +147,7 @@ def uneven_and_stiffness(rng: Generator) -> Table:
 
 
 def places_and_bearings(rng: Generator) -> Table:
-    """Where a weight stands on the crank, against its main bearings."""
+    """Draw open places of weights on the crank, with loads of its main bearings."""
     table = crankcase(rng)
     table.pop("constraints", None)
     table.pop("torsion", None)
@@ -189,7 +189,7 @@ def pistons_and_stars(rng: Generator) -> Table:
 
 
 def optional_and_uneven(rng: Generator) -> Table:
-    """One of two shafts may be built, throws between bounds."""
+    """Draw a problem of which one of two shafts may be built, with throws between bounds."""
     engine = {"layout": "inline", **mechanism(rng), **spaced(rng)}
     engine["throws"] = between_bounds(rng, int(rng.integers(3, 5)))
     shafts = balancers(rng, moving_mass(engine), 2)

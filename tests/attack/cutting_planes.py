@@ -106,7 +106,7 @@ class Mass:
 
 
 class Constant:
-    """What no unbalance moves."""
+    """A measure that is the same for all unbalances."""
 
     def __init__(self, value: float, size: int) -> None:
         self.value, self.size = value, size

@@ -613,7 +613,7 @@ def few_stiffnesses(minimum: int, maximum: int) -> Callable[[Generator], Table]:
 
 
 def convex_mounts(rng: Generator) -> Table:
-    """What is asked is convex in the stiffnesses: sag, total stiffness, torque-roll residual, frequencies."""
+    """Draw measures that are convex in the stiffnesses: sag, total stiffness, torque-roll residual, frequencies."""
     table = elastic_scene(rng)
     opened_stiffness(rng, table["mounts"], int(rng.integers(2, 10)))
     table["objective"] = dict(
@@ -783,7 +783,7 @@ def banks(rng: Generator) -> Table:
 
 
 def rotary(rng: Generator) -> Table:
-    """One to four rotors: phases given, open on even steps, or between bounds; end weights, gas in every chamber."""
+    """Draw one to four rotors: phases fixed, open on even steps, or between bounds; end weights, gas in chambers."""
     count, e = int(rng.integers(1, 5)), rng.uniform(0.008, 0.018)
     engine: Table = {
         "layout": "rotary", "cycle": "four-stroke", "eccentricity": q(e, "m"),

@@ -37,7 +37,7 @@ def middle(value: Any) -> float:
 
 @dataclass(frozen=True)
 class Weight:
-    """One unbalance.
+    """An open unbalance.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Weight:
 
     @property
     def entries(self) -> int:
-        """How many of the vector are its."""
+        """Number of its entries in the vector."""
         if self.follows or self.minimum == self.maximum:
             return 0
         return 1 if self.sector and self.sector[0] == self.sector[1] else 2
@@ -151,7 +151,7 @@ class Openings:
 
     @property
     def convex(self) -> bool:
-        """Whether unbalances alone are open."""
+        """True if unbalances alone are open."""
         return not self.numbers and self.table["engine"].get("throws") != "open"
 
     @property
@@ -163,7 +163,7 @@ class Openings:
         return np.array(rows).reshape(-1, 2)
 
     def parts(self, vector: np.ndarray) -> list[tuple[Weight, np.ndarray]]:
-        """Every weight with its entries."""
+        """Return all weights, each with its entries of the vector."""
         slices, at = [], len(self.numbers)
         for w in self.weights:
             slices.append((w, vector[at : at + w.entries]))

@@ -108,7 +108,7 @@ def springs(rng: Generator, plain: bool) -> Table:
 
 
 def open_numbers(rng: Generator, table: Table, kinds: list[str]) -> None:
-    """One number a kind, of any mount that has its own; one that is open already stays."""
+    """Open one number of each kind, at any mount that has this number; open ones stay."""
     places = [place for place in table["mounts"]["places"] if "stiffness" in place]
     for kind in kinds:
         place, axis = places[int(rng.integers(len(places)))], int(rng.integers(3))
@@ -166,7 +166,7 @@ def random_load(rng: Generator, table: Table) -> Table:
 
 
 def random_number(rng: Generator, table: Table) -> Table:
-    """Of block and mounts; those of one stiffness where no fluid has another."""
+    """Draw a measure of block and mounts; measures of one stiffness need mounts without a fluid."""
     terms: list[Table] = [{"quantity": "transmissibility"}, {"quantity": "transmissibility", "orders": [1]}]
     terms.append({"quantity": "static sag"})
     if "fluid_track" not in json.dumps(table["mounts"]):

@@ -32,7 +32,7 @@ POINTS = {"name", "speed", "weight", "imep", "motored", "gas"}
 
 
 def knows(table: Table) -> bool:
-    """Whether the own model covers a file: elastic mounts alone or with unbalances, of layouts that it has."""
+    """Return True if the own model covers a file: elastic mounts, alone or with unbalances, of its layouts."""
     engine, model = table["engine"], table.get("gas", {}).get("model", "wiebe")
     has_throws = isinstance(engine.get("throws"), list) and all(isinstance(t, int | float) for t in engine["throws"])
     points = {key for point in table["operating_points"] for key in point}
@@ -192,7 +192,7 @@ class Search:
 
 
 def reading(quantities: list[str], table: Table) -> float:
-    """What the own model reads values of these quantities to."""
+    """Return the relative accuracy of these quantities in the own model."""
     # of gas it has more orders than the package, whose last ones count in a transmissibility
     with_gas = [1e-7] if "gas" in table and "transmissibility" in quantities else []
     return max([EXACT, *with_gas, *(SAMPLED[key] for key in SAMPLED for q in quantities if q.startswith(key))])

@@ -40,7 +40,7 @@ def si(quantity: Any) -> float:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """One slider-crank: its place along the crank, angles [rad], lengths and masses."""
+    """Slider-crank: its place along the crank, angles [rad], lengths and masses."""
 
     x: float
     throw: float
@@ -100,7 +100,7 @@ def cylinders_and_pins(engine: Table) -> tuple[list[Cylinder], list[tuple[float,
 
 
 def derivative(samples: np.ndarray) -> np.ndarray:
-    """By crank angle, of samples over one turn."""
+    """Return the derivative by crank angle of samples over one turn."""
     spectrum = np.fft.fft(samples, axis=-1)
     return np.fft.ifft(1j * np.fft.fftfreq(samples.shape[-1], 1.0 / samples.shape[-1]) * spectrum, axis=-1)
 
@@ -169,7 +169,7 @@ def _panels(bends: list[float], whole: float) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=1)
 def _integrals() -> np.ndarray:
-    """From the start of a panel of -1 ... 1 to each node, of polynomials through the nodes."""
+    """Return integrals of polynomials through the nodes, from the start of a panel of -1 ... 1 to each node."""
     t, _ = np.polynomial.legendre.leggauss(16)
     s, w = np.polynomial.legendre.leggauss(16)
     lagrange = [np.poly1d(np.polyfit(t, np.eye(16)[k], 15)) for k in range(16)]
@@ -195,7 +195,7 @@ class Stroke:
 
     @property
     def dead(self) -> tuple[float, float]:
-        """Where crank and rod are in line, highest and lowest."""
+        """Return the highest and lowest angle at which crank and rod are in line."""
         return (
             math.asin(self.offset / (self.rod + self.radius)),
             math.pi + math.asin(self.offset / (self.rod - self.radius)),

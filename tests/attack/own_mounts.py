@@ -120,7 +120,7 @@ class Blocks:
         return more[:, None, None] * (a[..., :, None] * a[..., None, :])
 
     def about_centre(self, wrench: np.ndarray) -> np.ndarray:
-        """Of (count, 6) about the origin."""
+        """Return a wrench about the centre of gravity, from one about the origin, shape (count, 6)."""
         out = wrench.copy()
         out[..., 3:] -= np.cross(self.centre, wrench[..., :3])
         return out

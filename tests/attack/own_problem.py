@@ -36,7 +36,7 @@ class Open:
 
 @dataclass(frozen=True)
 class Weight:
-    """Where a weight is: along the crank, in the plane, its speed, and what its numbers say of its unbalance."""
+    """Weight: its place along the crank and in the plane, its speed ratio, and the table of its unbalance."""
 
     name: str
     x: float

@@ -87,13 +87,13 @@ FOOT = """
 
 
 def entries_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
-    """Every line of the logs that is whole."""
+    """Return all complete lines of the logs."""
     texts = [text for log in logs for text in log.read_text(encoding="utf-8").splitlines()]
     return [json.loads(text) for text in texts if text.endswith("}")]
 
 
 def lines_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
-    """Every problem of the logs, the last entry of each."""
+    """Return the last entry of each problem of the logs."""
     latest = {(line["family"], line["seed"]): line for line in entries_of(logs)}
     return list(latest.values())
 
@@ -106,7 +106,7 @@ def mended(logs: Iterable[Path]) -> list[dict[str, Any]]:
 
 
 def table_of(lines: list[dict[str, Any]]) -> list[str]:
-    """What was wrong, a line each."""
+    """Return a table row for each problem with a fault."""
     if not lines:
         return ["Nothing."]
     faults = [re.sub(r"\S*/attack-\w+/", "", "; ".join(line["wrong"]))[:300] for line in lines]
@@ -115,7 +115,7 @@ def table_of(lines: list[dict[str, Any]]) -> list[str]:
 
 
 def row(name: str, lines: list[dict[str, Any]]) -> str:
-    """One kind of problem, or one variation of a kind."""
+    """Return the row of one family, or of one variation."""
     status = Counter(line["kind"] or line["status"] for line in lines)
     text = ", ".join(f"{count} {kind}" for kind, count in status.most_common())
     wrong = sum(bool(line["wrong"]) for line in lines)
@@ -128,7 +128,7 @@ def row(name: str, lines: list[dict[str, Any]]) -> str:
 
 
 def family_row(family: str, lines: list[dict[str, Any]]) -> str:
-    """All kinds of one family together."""
+    """Return the row of a group of families."""
     firsts = ", ".join(str(sum(line["seed"] // 100000 == k for line in lines)) for k in range(SEEDS))
     wrong = sum(bool(line["wrong"]) for line in lines)
     return f"| {family} | {len(lines)} | {firsts} | {max(0, WANTED - len(lines))} | {wrong} |"

@@ -117,7 +117,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _pushed(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> tuple[np.ndarray, ...]:
-    """What the wall presses on the piston, across its axis, and the force on the crank pin."""
+    """Return the side force of the wall on the piston, and the force on the crank pin [N]."""
     base, end = _moving(m, turns)
     axis = np.exp(1j * m.bank)
     pressing = _pressing(m, turns, gas) * axis
@@ -139,14 +139,14 @@ def pressing_rod(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | N
 
 
 def on_pin(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
-    """Of the rod."""
+    """Return the force of the rod on its pin [N]."""
     if m.shape is not None:
         return on_eccentric(gas, m, speed)
     return _pushed(m, turns, speed, gas)[1]
 
 
 def on_shaft(scene: Any, machine: Machine, pins: Any, speed: float) -> list[tuple[float, np.ndarray]]:
-    """What stands on the crankshaft, and where."""
+    """Return the loads on the crankshaft, each with its place."""
     turned = np.exp(1j * angles(machine.turns))
     loads = [(m.x, pin) for m, pin in zip(machine.mechanisms, pins, strict=True)]
     # what turns with a throw beside its rod
@@ -172,7 +172,7 @@ def _on_bearings(scene: Any, machine: Machine, pins: np.ndarray, speed: float) -
 
 
 def torque_of(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
-    """Of one cylinder: work of the gas less what the piston's energy takes."""
+    """Return the torque of one cylinder: work of the gas less the change of kinetic energy, by angle [N m]."""
     if m.shape is not None:
         fired = np.mod(angles(turns) - (m.fires or 0.0), 2.0 * np.pi)
         return np.interp(fired, angles(1, FINE), rotor_torque(gas, m), period=2.0 * np.pi) if gas else np.zeros(SAMPLES)
@@ -191,7 +191,7 @@ def _integral(torque: np.ndarray, turns: int) -> np.ndarray:
 
 
 def _uneven(scene: Any, machine: Machine, k: int, wheel: float) -> float:
-    """From the energy of all that moves, whose mean speed over time is the one given."""
+    """Return the degree of irregularity from the kinetic energy; the mean speed over time is that of the point."""
     speed, gas, turns = scene.speeds[k], gas_at(scene, k), machine.turns
     inertia, torque = np.full(SAMPLES, wheel), np.zeros(SAMPLES)
     for m in machine.mechanisms:

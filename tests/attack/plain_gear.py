@@ -63,7 +63,7 @@ def weighed(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def mass(table: dict[str, Any], machine: Machine) -> float:
-    """Of pins, webs, shanks and piston pins."""
+    """Return the mass of pins, webs, shanks and piston pins [kg]."""
     density, radius = number(table["running_gear"]["density"]), machine.mechanisms[0].radius
     webs, (across, width) = part(table, "webs"), end(table)
     journal = min(number(b["diameter"]) for b in table["main_bearings"])
@@ -74,7 +74,7 @@ def mass(table: dict[str, Any], machine: Machine) -> float:
 
 
 def clearance(table: dict[str, Any], machine: Machine) -> float:
-    """What pin, web and half of a journal leave between the middles of pin and bearing."""
+    """Return the room that pin, web and half a journal leave between the middles of pin and bearing [m]."""
     thickness, (_, width) = part(table, "webs")["thickness"], end(table)
     distances = []
     for m in machine.mechanisms:
@@ -125,13 +125,13 @@ def stress(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
 
 
 def _loads(scene: Any, machine: Machine, speed: float, gas: dict[str, Any] | None) -> list[tuple[float, np.ndarray]]:
-    """What stands on the crankshaft, and where."""
+    """Return the loads on the crankshaft, each with its place."""
     pins = [plain_crankcase.on_pin(m, machine.turns, speed, gas) for m in machine.mechanisms]
     return plain_crankcase.on_shaft(scene, machine, pins, speed)
 
 
 def _torsion(table: dict[str, Any], machine: Machine, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
-    """Of all throws before each journal."""
+    """Return the torque of all throws before each journal [N m]."""
     torques = [(m.x, plain_crankcase.torque_of(m, machine.turns, speed, gas)) for m in machine.mechanisms]
     rows = []
     for bearing in table["main_bearings"]:

@@ -35,7 +35,7 @@ def number(text: Any) -> float:
 
 @dataclass(frozen=True)
 class Knuckle:
-    """Where an articulated rod is held: on the master rod."""
+    """Knuckle pin of an articulated rod on the master rod."""
 
     rod: float
     bank: float
@@ -340,7 +340,7 @@ class Machine:
 
 
 def turns_of(engine: dict[str, Any]) -> int:
-    """Of the crank, after which loads repeat; a rotor fires once a turn."""
+    """Return the turns of the crank after which loads repeat; a rotor fires once a turn."""
     return 2 if engine["cycle"] == "four-stroke" and engine["layout"] != "rotary" else 1
 
 

@@ -30,7 +30,7 @@ def _mean_and_rest(f: np.ndarray) -> tuple[float, np.ndarray]:
 
 @lru_cache(maxsize=32)
 def volume(shape: Shape, eccentricity: float) -> np.ndarray:
-    """Of one chamber but for a constant, from its firing on."""
+    """Return the volume of one chamber from its firing on, without a constant."""
     turn = 2.0 * np.pi * np.arange(ALL) / ALL
     out = np.exp(3j * (turn - np.pi / 3.0))
     place = eccentricity * out + shape.radius * np.exp(1j * turn)
@@ -58,7 +58,7 @@ def over(gas: dict[str, Any], m: Mechanism) -> np.ndarray:
 
 
 def _of_all(one: np.ndarray) -> np.ndarray:
-    """What three chambers, a turn of the shaft apart, do together over a turn from one's firing on."""
+    """Return the sum of three chambers, a turn of the shaft apart, over a turn from the firing of one."""
     return one.reshape(CHAMBERS, FINE).sum(axis=0)
 
 

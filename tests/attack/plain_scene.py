@@ -74,7 +74,7 @@ def smallest_ball(signal: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
 
 
 def norm_of(norm: str, signal: np.ndarray, weights: np.ndarray) -> float:
-    """Of (points, places, samples, d) with the weight of every point; those of weight zero do not count."""
+    """Return the norm of a signal, shape (points, places, samples, d); points of weight zero do not count."""
     counted = signal[weights > 0.0]
     share = weights[weights > 0.0] / weights.sum()
     if norm == "peak to peak":
@@ -183,7 +183,7 @@ class Scene:
 
     @cached_property
     def loaded_orders(self) -> np.ndarray:
-        """Which orders carry any load."""
+        """Indices of the orders that carry a load."""
         size = np.max([np.abs(w).max(axis=1) for w in self.wrenches], axis=0)
         return np.flatnonzero(size > 1e-13 * size.max())
 
@@ -276,7 +276,7 @@ class Scene:
         return sum(term.get("weight", 1.0) * self.measure(term) for term in terms_of(self.table))
 
     def violation(self, limit: Table) -> float:
-        """By how much of itself a limit is broken; negative where it is kept."""
+        """Return the relative excess over a limit; negative if it is met."""
         term = {**limit, "quantity": limit["limit"]}
         if limit["limit"] == "natural frequencies":
             block = self.mounting

@@ -39,7 +39,7 @@ class Rival:
 
 
 def stars_of(openings: Openings) -> Iterator[Table]:
-    """What may stand in [engine] in place of open stars."""
+    """Yield the keys of [engine] for each star that open throws may take."""
     engine = openings.table["engine"]
     if engine.get("throws") == "open":
         yield from even_stars(engine)
@@ -50,7 +50,7 @@ def stars_of(openings: Openings) -> Iterator[Table]:
 def convex_rival(
     openings: Openings, start: np.ndarray, star: Table, target: float = np.inf, charge: float = 1e3
 ) -> Rival:
-    """Where unbalances alone are open; looked for until none under `enough` can be left."""
+    """Return the best rival with open unbalances alone; the search ends if none can be below `target`."""
     program = Program(openings, star)
     optimum = program.minimum(start, target=target, charge=charge)
     if optimum.violation > EXCESS:
@@ -65,7 +65,7 @@ def convex_rival(
 
 
 def best_star(openings: Openings, maximum: int, target: float = np.inf) -> Rival | None:
-    """Every star by itself; None where there are too many, or none."""
+    """Return the best rival over all stars, each solved alone; None if there are none, or too many."""
     stars = list(stars_of(openings))
     if not stars or len(stars) > maximum:
         return None

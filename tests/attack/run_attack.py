@@ -54,7 +54,7 @@ EFFORT = 6
 
 
 def commit() -> str:
-    """Of the source that is attacked; empty where that is not known."""
+    """Return the commit of the attacked source; empty if it is unknown."""
     done = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
     return done.stdout.strip()
 
@@ -69,7 +69,7 @@ def drawn(family: str, seed: int) -> tuple[Table, np.random.Generator]:
 
 
 def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
-    """One problem of a family, or a variation of one: "prices of inline"."""
+    """Attack one problem of a family, or a variation of one: "prices of inline"."""
     variation, _, family = name.rpartition(" of ")
     table, rng = drawn(family, seed)
     with tempfile.TemporaryDirectory(prefix="attack-") as folder:
@@ -95,7 +95,7 @@ def finer(family: str, seed: int, folder: Path, effort: int) -> Verdict:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Every family in turn, seed by seed, until the number or the time is reached."""
+    """Attack each family in turn, seed by seed, until the number or the time is reached."""
     arguments.log.parent.mkdir(parents=True, exist_ok=True)
     families = GROUPS.get(arguments.families) or arguments.families.split(",")
     known, until, at = (

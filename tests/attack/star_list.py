@@ -28,7 +28,7 @@ def angles_of(engine: Table) -> Iterator[tuple[float, float]]:
 
 
 def even_stars(engine: Table) -> Iterator[Table]:
-    """What to put into [engine], for every star that fires evenly, its first throw where cylinder 1 fires at 0."""
+    """Yield the keys of [engine] for all stars that fire evenly; cylinder 1 fires at 0."""
     turns, count = turns_of(engine), int(engine["cylinders"])
     if engine["layout"] == "inline" and {"single_cylinders", "row_angle"} & engine.keys():
         yield from fired_stars(engine, turns, count)

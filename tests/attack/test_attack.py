@@ -56,7 +56,7 @@ def test_no_claim_falls(family: str, seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[Table, Result]:
-    """One with a limit that binds."""
+    """Return a problem with an active limit, and its result."""
     table, _ = problem("gas", 4)
     return table, solved(table, tmp_path_factory.mktemp("attack"))
 

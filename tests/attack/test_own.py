@@ -63,7 +63,7 @@ def test_a_random_design_is_worth_the_same(family: str, seed: int, tmp_path: Pat
 
 @pytest.mark.slow
 def test_forces_are_those_of_a_motion_in_time() -> None:
-    """From rest until nothing of the start is left; viscous damping alone has a law in time."""
+    """Integrate from rest until the start is forgotten; viscous damping alone has a law in time."""
     table, _ = drawn("any mounts", 3)
     table["mounts"] = {"kind": "elastic", "damping_per_stiffness": "4.0 ms", "places": table["mounts"]["places"]}
     for place in table["mounts"]["places"]:

@@ -30,7 +30,7 @@ def is_global(result: Any) -> bool:
 
 
 def doubt(*results: Any) -> float:
-    """What is left open of values, together; beside what is given they may vanish but for rounding."""
+    """Return the sum of gaps and errors of the values; a vanishing value has the rounding of the initial one."""
     left = sum((r.certificate.gap + r.error_estimate) * r.objective.value for r in results)
     start = max(r.objective.initial for r in results if np.isfinite(r.objective.initial))
     return left + READING * max(r.objective.value for r in results) + 1e-9 * start
@@ -115,7 +115,7 @@ DIMENSIONS = {
 
 
 def rescaled(value: Any, sizes: tuple[float, float, float]) -> Any:
-    """Every number with a dimension in other units."""
+    """Return a table with all its numbers in other units."""
     if isinstance(value, dict):
         return {k: rescaled(v, sizes) for k, v in value.items()}
     if isinstance(value, list):

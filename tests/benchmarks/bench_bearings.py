@@ -55,7 +55,7 @@ def per_design(problem: Problem, channel: LoadChannel | None) -> float:
 
 
 def of_channels() -> list[str]:
-    """What mount, bearing and pin forces of a design cost beside it, and over the mounts."""
+    """Time mount, bearing and pin forces of a design, against the design and against the mounts."""
     whole = laufruhe.load(PROBLEMS / "tractor-four-bearings.toml")
     problem = replace(whole, points=whole.points[:1])
     rounds = [[per_design(problem, channel) for channel in (None, *FORCES)] for _ in range(REPEATS)]

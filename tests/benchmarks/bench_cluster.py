@@ -63,7 +63,7 @@ Of {} pieces that do nothing, by the clock.
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one run: size, time by the clock and of processors [s], files, bytes, peak of memory [byte]."""
+    """Cost of one run: size, time by the clock and of processors [s], files, bytes, peak of memory [byte]."""
 
     size: int
     wall: float
@@ -73,7 +73,7 @@ class Cost:
     memory: int
 
     def row(self) -> str:
-        """Of a table."""
+        """Return the row of a table."""
         sizes = f"{self.files} | {self.stored / 1e6:.2f} | {self.memory / 1e6:.0f}"
         return f"| {self.size:,} | {self.wall:.1f} | {self.cores:.1f} | {sizes} |"
 
@@ -101,7 +101,7 @@ def timed(folder: Path, *words: str) -> tuple[float, float, int]:
 
 
 def stored(root: Path, part: str) -> tuple[float, int, int, int]:
-    """Of a part in a store: core-seconds, draws done, files, bytes."""
+    """Return core-seconds, draws done, files and bytes of a part in a store."""
     files = list((root / part).glob("*.npz"))
     pieces = [np.load(path) for path in files]
     draws = sum(len(piece["values"]) for piece in pieces)
@@ -114,7 +114,7 @@ def stored(root: Path, part: str) -> tuple[float, int, int, int]:
 
 
 def overheads(cluster: clusters.Cluster) -> tuple[list[str], float]:
-    """What one piece costs that does nothing; of a cluster [ms]."""
+    """Return table rows of the time of a piece that does nothing, and that of a cluster [ms]."""
 
     def spent(executor: Executor) -> float:
         list(unordered_map(abs, [-1] * 50, executor))
@@ -175,7 +175,7 @@ def killed(folder: Path, count: int) -> list[str]:
 
 
 def _attacked(cluster: clusters.Cluster, here: Path, rng: random.Random, seconds: float) -> str:
-    """One run with one death at a random moment; says whose."""
+    """Run once, end one process at a random moment, and return its name."""
     running = clusters.started(here, "--scheduler", cluster.address)
     until = time.monotonic() + rng.uniform(1.0, max(seconds, 2.0))
     while time.monotonic() < until and running.poll() is None:
@@ -239,7 +239,7 @@ def at_once(folder: Path, solves: int) -> Cost:
 
 
 def plan(evaluated: list[Cost], solved: list[Cost], handing: float) -> list[str]:
-    """What a thousand million of each would take, from these figures and what handing out a piece costs [ms]."""
+    """Estimate the time of a thousand million draws of each kind; `handing` is the time to hand out a piece [ms]."""
     rows = []
     for name, costs, chunk in (("evaluations", evaluated, 100_000), ("proven solves", solved, 10_000)):
         seconds, pieces = 1e9 * each_of(costs), 1e9 / chunk
@@ -280,7 +280,7 @@ def drawn(sizes: tuple[list[Cost], list[Cost]], counts: list[tuple[int, float, f
 
 
 def command_line() -> argparse.Namespace:
-    """How much of it."""
+    """Return the arguments: numbers of draws, scenes and kills."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=8)
     parser.add_argument("--evaluations", type=at_least(2 * MAX_TABLED), default=1_000_000)
@@ -301,7 +301,7 @@ def at_least(minimum: int) -> Callable[[str], int]:
 
 
 def main() -> None:
-    """All of it."""
+    """Measure everything and write the page."""
     arguments = command_line()
     # on a busy machine a scheduler answers late
     own_cluster.ANSWERS = own_cluster.PATIENCE = 600.0

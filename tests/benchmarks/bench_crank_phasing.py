@@ -87,7 +87,7 @@ minimise = "mean mount force"
 
 @dataclass(frozen=True)
 class Row:
-    """One size of the two-order couple."""
+    """Row of the table: times for the two-order couple of one number of throws."""
 
     throws: int
     stars: int
@@ -121,7 +121,7 @@ def problem_of(text: str) -> Problem:
 
 
 def space_of(throws: int) -> StarSpace:
-    """Every star of a two-stroke in-line engine, images counted once."""
+    """Return the space of all stars of a two-stroke in-line engine, mirror images counted once."""
     layout = inline(throws, 1.0)
     return StarSpace(throws, even_patterns(Cycle.TWO_STROKE, layout), layout.throw_positions, True, True)
 

@@ -69,7 +69,7 @@ def automatic(problem: Problem) -> Problem:
 
 
 def solves() -> list[str]:
-    """One solve with its error estimate, exact and automatic in turns, of ready problems that take little time."""
+    """Time a solve with its error estimate, exact and automatic in turns, for quick ready problems."""
     lines = [
         "## One solve, automatic at 1e-3 against exact",
         "",

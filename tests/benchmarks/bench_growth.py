@@ -197,7 +197,7 @@ def _receive(running: dict[Any, tuple[int, int, Any]], answers: list[Any], free:
 
 @dataclass(frozen=True)
 class Sweep:
-    """What grows with what."""
+    """A cost that grows with a size of the problem."""
 
     what: str
     by: str
@@ -290,7 +290,7 @@ def designs_row(name: str, answers: Sequence[tuple[float, float]]) -> str:
 
 
 def exponent(sizes: Sequence[int], times: Sequence[float]) -> float:
-    """Of the larger half, by least squares of the logarithms."""
+    """Return the exponent of the larger half of the sizes, by least squares of the logarithms."""
     first = len(sizes) // 2 - (len(sizes) == 2)
     slope = np.polyfit(np.log(sizes[first:]), np.log(times[first:]), 1)[0]
     return float(slope)
@@ -303,7 +303,7 @@ def factor(sizes: Sequence[int], times: Sequence[float]) -> float:
 
 
 def seconds_text(seconds: float) -> str:
-    """With a unit that reads well."""
+    """Return a time [s] in a readable unit."""
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 

@@ -27,7 +27,7 @@ results has none, or all of one run. What a crash of the machine leaves is not t
 
 
 def page(counts: kills.Told, studies: int, points: int, solves: int) -> str:
-    """What was tried and what came of it."""
+    """Return the page: what was tried, and how often each outcome occurred."""
     rows = [f"| {what} | {count} |" for what, count in sorted(counts.tried.items())]
     wrong = [f"- {line}" for line in counts.wrong] or ["None."]
     head = [

@@ -27,7 +27,7 @@ def elastic_problems() -> list[Problem]:
 
 
 def row_of(problem: Problem, seeds: int) -> str:
-    """One line of the table."""
+    """Return the row of one problem over several seeds."""
     values, seconds = [], []
     if problem.phasing is not None:
         problem = replace(problem, phasing=replace(problem.phasing, best=STARS))

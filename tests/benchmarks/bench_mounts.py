@@ -86,7 +86,7 @@ def one_speed(problem: Problem) -> list[str]:
 
 
 def many_speeds(problem: Problem) -> list[str]:
-    """One map against a loop over single calls."""
+    """Time one mapped call against a loop over single calls."""
     engine, point = problem.engine, problem.points[-1]
     speeds = np.linspace(300.0, 3000.0, 1000) * RPM
 
@@ -184,7 +184,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
         return objective_value(problem, at), np.array(rooms)
 
     def seen(y: np.ndarray) -> tuple[float, np.ndarray]:
-        """One evaluation for objective and limits."""
+        """Evaluate objective and limits at once."""
         key = y.tobytes()
         if key not in known:
             if time.process_time() - began > SLSQP_SECONDS:

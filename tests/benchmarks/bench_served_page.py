@@ -75,13 +75,13 @@ def measured(name: str, control: str, folder: Path) -> np.ndarray:
 
 
 def chromium_version() -> str:
-    """As it calls itself."""
+    """Return the version that Chromium prints."""
     with launched() as browser:
         return browser.version
 
 
 def main() -> None:
-    """All scenes, one after the other."""
+    """Measure all scenes in turn, and write the page."""
     if executable() is None:
         skip(MISSING)
     rows = []

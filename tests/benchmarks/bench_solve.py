@@ -50,7 +50,7 @@ NAMES = {
 
 
 def seconds(command: list[str], compiled: str) -> Times:
-    """Of a command in an empty folder, its modules compiled before, as installed ones are."""
+    """Return the times of a command in an empty folder; its modules are compiled, as installed ones are."""
     around = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | ONE_THREAD
     with tempfile.TemporaryDirectory() as folder:
         start, began = processor_seconds(), time.perf_counter()

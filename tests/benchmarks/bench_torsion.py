@@ -83,7 +83,7 @@ def comparison_rows() -> list[str]:
 
 
 def ranked() -> list[str]:
-    """Every firing order of more and more cylinders, the best ten proven."""
+    """Rank all firing orders of more and more cylinders; the best ten are proven."""
     rows = []
     for count in CYLINDERS:
         tables = tables_of(PROBLEM)

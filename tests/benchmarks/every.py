@@ -51,7 +51,7 @@ def _ended(process: subprocess.Popen[bytes]) -> None:
 
 
 def verdict_text(status: int | None, said: str, seconds: float, limit: float) -> str:
-    """What became of a script, in a line."""
+    """Return a line on the outcome of a script."""
     if status is None:
         return f"FAILED: took longer than {limit:.0f} s"
     if status == SKIPPED:

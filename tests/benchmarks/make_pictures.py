@@ -73,7 +73,7 @@ def live_page() -> None:
 
 
 def _moves(page: Page) -> Iterator[tuple[Image.Image, int]]:
-    """Every frame, and how long it stands [ms]."""
+    """Yield all frames, each with the time that it is shown [ms]."""
     best = page.evaluate("laufruheLive.page.then(page => page.design())")
     at = {**best, "left.unbalance": 0.0, "right.unbalance": 0.0}
     yield _screenshot(page, at, None), 1200

@@ -32,13 +32,13 @@ def spent(work: Callable[[], object]) -> float:
 
 
 def processor_seconds() -> float:
-    """Of this process and of those that it has waited for."""
+    """Return the processor time of this process and of finished child processes [s]."""
     both = (resource.getrusage(whose) for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(usage.ru_utime + usage.ru_stime for usage in both)
 
 
 def _busy_seconds() -> float:
-    """Of all processors since the machine was started, whoever had them."""
+    """Return the busy time of all processors since the start of the machine [s]."""
     times = psutil.cpu_times()._asdict()
     # what guests had is counted as user time too
     return float(sum(times.values()) - sum(times.get(name, 0.0) for name in ("idle", "iowait", "guest", "guest_nice")))
@@ -48,7 +48,7 @@ _BEGAN, _BUSY, _USED = time.perf_counter(), _busy_seconds(), processor_seconds()
 
 
 def _machine() -> str:
-    """What made the page, on what machine, and how busy that was with other work."""
+    """Return sentences on the command, the machine, and its load by other programs."""
     elapsed, own_seconds = time.perf_counter() - _BEGAN, processor_seconds() - _USED
     others = max(_busy_seconds() - _BUSY - own_seconds, 0.0) / elapsed
     words = " ".join(["python", f"tests/benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]])

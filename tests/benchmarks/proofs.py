@@ -28,7 +28,7 @@ KINDS = {"global": 0, "global within gap": 1, "local": 2, "none": 3}
 
 @dataclass(frozen=True)
 class Answer:
-    """What a version says of one problem; processor seconds of one process."""
+    """Answer of one version to one problem; processor seconds of one process."""
 
     name: str
     status: str
@@ -91,7 +91,7 @@ def saved_answers(path: Path) -> dict[str, Answer]:
 
 
 def write(path: Path, answers: list[Answer]) -> None:
-    """As a table."""
+    """Write the answers as a CSV table."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Answer)], lineterminator="\n")
@@ -100,7 +100,7 @@ def write(path: Path, answers: list[Answer]) -> None:
 
 
 def page(answers: list[Answer], before: dict[str, Answer]) -> str:
-    """What is proven of every problem, now and before."""
+    """Return the page: proofs of all problems, now and before."""
     proven = [a for a in answers if a.kind]
     counts = {kind: sum(a.kind == kind for a in proven) for kind in KINDS}
     both = [(before[a.name], a) for a in proven if a.name in before and before[a.name].kind]
@@ -135,7 +135,7 @@ def number(value: float) -> str:
 
 
 def share(gap: float) -> str:
-    """As a share of the value."""
+    """Return a gap as a share of the value."""
     return f"{gap:.1e}" if math.isfinite(gap) else "-"
 
 

@@ -81,6 +81,15 @@ def test_names_and_docstrings_are_plain(room: str) -> None:
     assert not {name: found for name, found in faults.items() if found}
 
 
+@pytest.mark.parametrize("folder", ["attack", "benchmarks"])
+def test_names_and_docstrings_of_tools_are_plain(folder: str) -> None:
+    faults = {}
+    for file in sorted((Path(__file__).parents[1] / folder).glob("*.py")):
+        # short private functions of tools may have a docstring
+        faults[file.name] = [fault for fault in faults_of(file.read_text("utf-8")) if "docstring on" not in fault]
+    assert not {name: found for name, found in faults.items() if found}
+
+
 @pytest.mark.parametrize(
     "text",
     [
