@@ -325,7 +325,10 @@ def main() -> None:
     lines += ["angles; `solve` refines them, evaluates the design exactly and proves it.", ""]
     lines += answers(optimum_times(), "[N]")
     lines += ["", "## Crank", "", f"Two-stroke with {THROWS} throws: least root mean square of the rocking couples of"]
-    lines += ["orders 1 and 2, over the force of a throw of first order (rod of any length) times the spacing.", ""]
+    lines += [
+        "orders 1 and 2, over the inertia force of a piston on an endless rod times the spacing of two throws.",
+        "",
+    ]
     lines += answers(crank_times(), "[-]")
     if not peers_alone:
         lines += ["", "## Work beside its neighbour", ""]
