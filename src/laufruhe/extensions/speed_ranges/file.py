@@ -6,7 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import PlainValidator, WithJsonSchema
 
 from laufruhe.extensions.speed_ranges.ranges import WORST, Curve, SpeedRange, SpeedRanges
 from laufruhe.files import fields as f
@@ -20,7 +22,20 @@ from laufruhe.problem.problem import Problem
 
 MAX_RANGES, MAX_PAIRS = 8, 1000
 _UNIT = re.compile(r"[\[(](.+?)[\])]")
-CurveField: TypeAlias = str | list[f.Pair[f.Side]]
+
+
+def _curve(raw: object) -> object:
+    if isinstance(raw, str) or (isinstance(raw, list) and all(isinstance(row, list) and len(row) == 2 for row in raw)):
+        return raw
+    raise f.refusal('is no curve; write "5 mm/s", [["2000 rpm", "5 mm/s"], ["6000 rpm", "9 mm/s"]], or a CSV file')
+
+
+_PAIR = {"type": "array", "items": {"type": ["string", "number"]}, "minItems": 2, "maxItems": 2}
+CurveField: TypeAlias = Annotated[
+    str | list[list[Any]],
+    PlainValidator(_curve),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array", "items": _PAIR, "minItems": 1}]}),
+]
 
 
 class SpeedRangeTable(QuantityTable):
