@@ -29,6 +29,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, ProofStrength
+from laufruhe.prove.mounts.named import named_part
 from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.boxes.place_boxes import without_places
 from laufruhe.solvers.conclusion import (
@@ -49,7 +50,7 @@ from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, im
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
+from laufruhe.solvers.sampling_refinement import refine_sampling, sampling_overestimate, violation_at_fine_sampling
 from laufruhe.solvers.stars.even_search import refuse_long
 from laufruhe.solvers.walk import check_by_walk
 
@@ -353,8 +354,23 @@ def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = Non
         return infeasible_result(problem, evaluate_start(problem), conflict, {})
     relaxed = _relaxation(problem, kinds, method)
     if relaxed is None:
-        return method.solve(problem)
-    return solve_by_relaxation(problem, relaxed, partial(_solve_reduced, remaining=()), method.solve)
+        result = method.solve(problem)
+    else:
+        result = solve_by_relaxation(problem, relaxed, partial(_solve_reduced, remaining=()), method.solve)
+    return _with_mount_bounds(problem, relaxed, result) if method.solver is solve_all_numbers else result
+
+
+def _with_mount_bounds(problem: Problem, relaxed: Problem | None, result: Result) -> Result:
+    # provers of mounts bound more measures than the methods of mounts accept
+    named = named_part(problem)
+    is_bounded = relaxed is not None and (relaxed.objective, relaxed.limits) == (named.objective, named.limits)
+    is_of_mounts = problem.mount_decisions and open_kinds(problem) <= {*_MOUNTS}
+    if is_bounded or not is_of_mounts or not problem.search.proves or result.status is not Status.FEASIBLE:
+        return result
+    from laufruhe.solvers.mounts.nonlinear import with_mount_bounds
+
+    assert result.objective is not None
+    return with_mount_bounds(result, result.objective.value - sampling_overestimate(problem, result.final))
 
 
 def by_solver(problem: Problem, name: str) -> Problem:

@@ -22,7 +22,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult
-from laufruhe.prove.certificate import ProofStrength, gap_of, gap_tolerance_of, make_certificate
+from laufruhe.prove.certificate import ProofStrength, gap_of, gap_tolerance_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Question, run_provers
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem, stiffness_bounds
@@ -44,6 +44,7 @@ from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unba
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import StartPoint, evaluate_design_at, start_of_result
+from laufruhe.solvers.relaxation import with_better_bound
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
@@ -97,14 +98,14 @@ def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in
     Parameters
     ----------
     value
-        Objective of the best design of all crank stars, which the bound need not exceed [SI].
+        Objective that the bound need not exceed, such as that of the best of all crank stars [SI].
     cutoff
         Lower bound at which the proof stops [SI].
     in_batch
         True if many results are bounded, so that cheap bounds come first.
     """
     problem, certificate = result.problem, result.certificate
-    if certificate is None or result.objective is None or is_stiffness_problem(problem) or problem.phasing is not None:
+    if certificate is None or result.objective is None or problem.phasing is not None:
         return result
     zero_level = numerical_zero(problem, result.final.engine)
     gap_tolerance = max(
@@ -112,13 +113,7 @@ def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in
     )
     question = Question(problem, value, gap_tolerance, values_of(problem, result), in_batch=in_batch)
     division = run_provers(question)
-    if division.bound <= certificate.lower_bound:
-        return result
-    text = f"{certificate.method}; bounds of mounts from {counted(division.boxes, 'box')}"
-    value, residual = result.objective.value, certificate.kkt_residual
-    strength = ProofStrength.PARTIAL
-    certificate = make_certificate(value, division.bound, zero_level, problem.tolerance, strength, residual, text)
-    return replace(result, certificate=certificate)
+    return with_better_bound(result, division.bound, f"bounds of mounts from {counted(division.boxes, 'box')}")
 
 
 def are_contradictory(problem: Problem, limits: Sequence[Limit]) -> bool:

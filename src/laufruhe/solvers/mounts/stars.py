@@ -30,6 +30,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.mounts.provers import Question, run_provers
+from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.solvers.conclusion import conflict_message, evaluate_design, refine_result, values_of, witness_of
 from laufruhe.solvers.mounts.nonlinear import mount_numbers, solve_mounts, solve_moved, with_mount_bounds
 from laufruhe.solvers.mounts.starts import start_of_result
@@ -166,6 +167,9 @@ def _with_bounds(designs: list[StarDesign], phasing: Phasing, design_count: int)
     """Return the designs with better lower bounds by the provers of mounts, up to the best star's objective (E54)."""
     minimum = _minimum_value(designs)
     if len(designs) < design_count or phasing.continuous or not 0.0 < minimum < math.inf:
+        return designs
+    if is_stiffness_problem(designs[0].result.problem):
+        # the search has found these bounds
         return designs
     first = with_mount_bounds(designs[0].result, minimum, in_batch=len(designs) > 1)
     bounded = [replace(designs[0], result=first), *designs[1:]]
