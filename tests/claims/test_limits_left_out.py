@@ -9,6 +9,7 @@ import pytest
 import laufruhe
 from attack.crossings import transmissibility_and_weights
 from attack.families import few_stiffnesses
+from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure, Term
@@ -79,6 +80,20 @@ def test_stiffness_has_a_bound_under_a_limit_without_formulas(share: float, kind
     assert found.certificate.kind is kind
     assert found.certificate.lower_bound == free.certificate.lower_bound
     assert found.final.violation(found.problem.limits) <= FEASIBILITY_TOL
+
+
+@pytest.mark.slow
+@pytest.mark.skipif("worst mean" not in NORMS, reason="the extension worst_mean is removed")
+def test_boxes_bound_a_norm_that_no_method_of_mounts_accepts() -> None:
+    """Worst means of forces on open stiffness, which local programs decide, against random designs."""
+    own = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
+    worst = own.changed(objective=(Term(Measure(CHANNELS["mount force"], NORMS["worst mean"])),), limits=())
+    found, random = laufruhe.solve(worst), np.random.default_rng(3)
+    assert found.certificate is not None
+    assert found.certificate.kind is Proof.GLOBAL
+    for _ in range(20):
+        values = [random.uniform(decision.lower, decision.upper) for decision in worst.decisions]
+        assert found.certificate.lower_bound <= objective_value(worst, evaluate(worst, worst.design(values)))
 
 
 @pytest.mark.slow
