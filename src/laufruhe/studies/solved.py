@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
-from laufruhe.errors import ModelError, SolverError
+from laufruhe.errors import SolverError
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem.evaluation import Evaluation, place_measures
 from laufruhe.problem.problem import Problem
@@ -20,7 +19,11 @@ NOTHING_OPEN = "nothing open"
 HIGHEST_ORDER = 12.0
 
 
-def decide_scene(problem: Problem) -> tuple[Result, str, str]:
+Decided: TypeAlias = tuple[Result, str, str]
+"""Result, status and proof of a problem of a study."""
+
+
+def decide_scene(problem: Problem) -> Decided:
     """Return result, status and proof of a study's problem; without a solution, those of the initial design."""
     try:
         result = solve(problem)
@@ -33,28 +36,27 @@ def decide_scene(problem: Problem) -> tuple[Result, str, str]:
     return result, str(result.status), proof
 
 
-Further: TypeAlias = Callable[[Evaluation], float]
-"""Function that returns a further quantity of a design; its `ModelError` states why the design has no value."""
+def has_design(decided: Decided) -> bool:
+    """Return True if a problem of a study has a final design."""
+    return decided[1] not in (FAILED, "infeasible")
 
 
-def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
-    """Return the record of a problem of a study [SI], NaN for missing values.
+def solve_scene(problem: Problem) -> Record:
+    """Return the record of a problem of a study, as `record_of`."""
+    return record_of(problem, decide_scene(problem))
+
+
+def record_of(problem: Problem, decided: Decided) -> Record:
+    """Return the record of a decided problem of a study [SI], NaN for missing values.
 
     The record has the metric with its unit, status and proof ("nothing open" without decisions), the initial and
     final objective, and the lower bound. It has mean and maximum force by mount [N]; the mean is weighted over
     operating points. It has the decisions, forces by order, and values and shadow prices of the limits, by name.
-    It ends with the further quantities, or the reason why a quantity has no value.
     """
-    result, status, proof = decide_scene(problem)
+    result, status, proof = decided
     objective, bound = result.objective, result.certificate.lower_bound if result.certificate else math.nan
     limits = limits_of(result)
-    designed = status not in (FAILED, "infeasible")
-    values, reasons = dict.fromkeys(further or {}, math.nan), dict.fromkeys(further or {}, "")
-    for name, quantity in (further or {}).items() if designed else ():
-        try:
-            values[name] = _finite(quantity(result.final))
-        except ModelError as error:
-            reasons[name] = str(error).partition("; ")[0]
+    designed = has_design(decided)
     no_forces = dict.fromkeys(result.initial.mount_names, (math.nan, math.nan))
     initial, final = _on_mounts(problem, result.initial), _on_mounts(problem, result.final) if designed else no_forces
     return {
@@ -76,8 +78,6 @@ def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) 
         "limit_value": {limit.name: _finite(limit.value) for limit in limits},
         "shadow_price": {limit.name: limit.shadow_price for limit in limits if result.certificate},
         "limit_units": {limit.name: limit.unit for limit in limits},
-        "further": values,
-        "why_none": reasons,
     }
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field
@@ -34,13 +34,15 @@ from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
 from laufruhe.studies.scenes import Point, ProblemFiles
-from laufruhe.studies.solved import NOTHING_OPEN, Further, solve_scene
+from laufruhe.studies.solved import NOTHING_OPEN, Decided, decide_scene, has_design, record_of
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 
 if TYPE_CHECKING:
     import xarray as xr
 
+Quantity: TypeAlias = Callable[[Evaluation], float]
+"""Function that returns a quantity of a design; its `ModelError` states why the design has no value."""
 EQUAL = "equal cylinders"
 _SAME, _NEGLIGIBLE, _FIGURES = 1e-9, 1e-7, 1e-5
 _MIN_FLYWHEEL = "least flywheel"
@@ -110,7 +112,7 @@ class LayoutComparison(SweptPart):
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the record of one layout's proven optimum, with every further quantity of that design."""
         problem = problem_files.problem(point)
-        further: dict[str, Further] = {
+        further: dict[str, Quantity] = {
             n: partial(_value, m) for n, m in self._measures(problem, point.case, problem_files).items()
         }
         if self.flywheel_for is not None:
@@ -119,10 +121,10 @@ class LayoutComparison(SweptPart):
                 swing_of(design.engine, loads.point, design.fidelity).minimum_inertia(degree) for loads in design.loads
             )
         sizes = {} if point.case.equal_power_to is None else _sizes(problem)
-        record = solve_scene(problem, {**further, **{name: size for name, (_, size) in sizes.items()}})
-        for name in sizes:
-            del record["why_none"][name]
-        record["size"] = {name: record["further"].pop(name) for name in sizes}
+        decided = decide_scene(problem)
+        record = record_of(problem, decided)
+        record["further"], record["why_none"] = _values_of(decided, further)
+        record["size"], _ = _values_of(decided, {name: size for name, (_, size) in sizes.items()})
         record["size_units"] = {name: unit for name, (unit, _) in sizes.items()}
         record["places"] = {mount.name: list(mount.position) for mount in problem.engine.mounts}
         return record
@@ -186,16 +188,28 @@ class LayoutComparison(SweptPart):
         return _side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)
 
 
-def _sizes(problem: Problem) -> dict[str, tuple[str, Further]]:
+def _values_of(decided: Decided, quantities: Mapping[str, Quantity]) -> tuple[dict[str, float], dict[str, str]]:
+    """Return the quantities of a final design [SI], NaN for missing values, and the reason why one has no value."""
+    values, reasons = dict.fromkeys(quantities, math.nan), dict.fromkeys(quantities, "")
+    for name, quantity in quantities.items() if has_design(decided) else ():
+        try:
+            value = quantity(decided[0].final)
+            values[name] = value if math.isfinite(value) else math.nan
+        except ModelError as error:
+            reasons[name] = str(error).partition("; ")[0]
+    return values, reasons
+
+
+def _sizes(problem: Problem) -> dict[str, tuple[str, Quantity]]:
     """Return the sizes of a resized engine by name: unit, and function of its design."""
 
-    def power(k: int) -> Further:
+    def power(k: int) -> Quantity:
         return lambda design: torque_facts(design.engine, design.loads[k].point, design.fidelity).power
 
-    def speed(k: int) -> Further:
+    def speed(k: int) -> Quantity:
         return lambda design: design.loads[k].point.speed
 
-    sizes: dict[str, tuple[str, Further]] = {
+    sizes: dict[str, tuple[str, Quantity]] = {
         "bore": ("m", lambda design: math.sqrt(4.0 * design.engine.slider_cranks[0].piston_area / math.pi)),
         "stroke": ("m", lambda design: design.engine.slider_cranks[0].stroke),
         "displacement": ("m^3", lambda design: displacement(design.engine.slider_cranks)),
