@@ -189,7 +189,7 @@ class LayoutComparison(SweptPart):
 
 
 def _values_of(decided: Decided, quantities: Mapping[str, Quantity]) -> tuple[dict[str, float], dict[str, str]]:
-    """Return the quantities of a final design [SI], NaN for missing values, and the reason why one has no value."""
+    # quantities of a final design [SI], NaN for missing values, and the reason why one has no value
     values, reasons = dict.fromkeys(quantities, math.nan), dict.fromkeys(quantities, "")
     for name, quantity in quantities.items() if has_design(decided) else ():
         try:
