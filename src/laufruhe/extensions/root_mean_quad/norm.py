@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.norm import Cones, Grid, amplitudes, lengths, mean_square
-from laufruhe.numerics.norms.rms import RootMeanSquare
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, Subdifferential, amplitudes, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 
-class RootMeanQuad(RootMeanSquare):
+class RootMeanQuad(Norm):
     """Fourth root of the weighted mean of the fourth powers of row lengths."""
 
     name = "rmq"
-    averages = True
-    is_euclidean = is_pointwise = False
+    averages = is_convex = is_smooth = is_monotone_in_lengths = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return (sum_k w_k |v_k|^4)^(1/4) over rows v_k with weights w_k."""
@@ -41,6 +39,10 @@ class RootMeanQuad(RootMeanSquare):
         weights = grid.weights / norm
         return weights * (lengths(rows) / norm) ** 2, 2.0 * weights / norm**2, 3.0 / norm
 
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
+        """Return the gradient as base, or Z at zero rows: the norm is smooth except at zero."""
+        return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
+
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return the dual norm (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4).
 
@@ -52,6 +54,10 @@ class RootMeanQuad(RootMeanSquare):
         density = size / np.where(weights > 0.0, weights, 1.0)
         longest = float(density.max(initial=0.0))
         return longest and longest * float(weights @ (density / longest) ** (4.0 / 3.0)) ** 0.75
+
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
+        """Return the gradient at the design."""
+        return self.subgradient(grid, rows)
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return the fourth root of the weighted sum of fourth powers."""
