@@ -60,7 +60,7 @@ def _tables(result: Result) -> list[Table]:
     }  # fmt: skip
     head = ("at", "cylinder", *(f"{word} [{readable(unit)[0]}]" if unit else word for word, unit in units.items()))
     note = (
-        "Final design, at the mean speed of the crank. Angles: own crank after top dead centre. Reversals: how often "
+        'Final design, at the mean speed of the crank. Crank angles stand behind "at" [deg]. Reversals: how often '
         "the side force changes its sign in a cycle, and its rate at the fastest reversal, a measure of piston slap."
     )
     return [Table(head, texts, title="Motion of the pistons", left=2, note=note, file="piston-motion")]
@@ -71,7 +71,7 @@ def _text(value: float, unit: str) -> str:
 
 
 def _at(extreme: Extreme, unit: str) -> str:
-    return f"{_text(extreme.value, unit)} at {trimmed(round(math.degrees(extreme.angle), 1) + 0.0)} deg"
+    return f"{_text(extreme.value, unit)} at {trimmed(round(math.degrees(extreme.angle), 1) + 0.0)}"
 
 
 SECTION = Section("piston_motion", _has_pistons, _tables, _record, ("piston-motion",))

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
 from laufruhe.errors import InputError, ModelError, SolverError
-from laufruhe.extensions.speed_ranges.peaks import Response
+from laufruhe.extensions.speed_ranges.peaks import RangeResponses, Response
 from laufruhe.extensions.speed_ranges.ranges import SpeedRange, SpeedRanges, Speeds, at_speeds, with_speeds
 from laufruhe.files.complaints import Refused
 from laufruhe.files.measures import MeasureContext
@@ -27,7 +27,7 @@ from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
 from laufruhe.solvers import methods
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values, refine_objective, violation_message
-from laufruhe.solvers.result import Result, ResultDetails, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import ObjectiveValue
 
 ROUNDS, TOPS = 25, 8
@@ -41,23 +41,6 @@ TIGHT = 0.1
 _STRENGTHS = {
     Proof.GLOBAL: ProofStrength.EXACT, Proof.WITHIN_GAP: ProofStrength.EXACT, Proof.LOCAL: ProofStrength.RELAXED,
 }  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class RangeResponses(ResultDetails):
-    """Responses over the speed ranges of a problem, of its initial and its final design.
-
-    Attributes
-    ----------
-    initial, final
-        Response over each range.
-    rounds
-        Count of problems that were solved.
-    """
-
-    initial: tuple[Response, ...]
-    final: tuple[Response, ...]
-    rounds: int
 
 
 def _ranges_of(problem: Problem) -> tuple[SpeedRange, ...]:

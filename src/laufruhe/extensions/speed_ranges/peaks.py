@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from laufruhe.present.numbers import RPM
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers.result import ResultDetails
 
 SAMPLES, COARSE, BLOCK, FINE = 160, 9, 40, 4000
 """Speeds at equal ratios, those where orders are compared, those evaluated at once, and those of the mean."""
@@ -131,6 +132,23 @@ class Response:
         values = PchipInterpolator(self.speeds, self.values)(speeds)
         weights = np.ones(len(speeds)) if self.span.shares is None else np.interp(speeds, *self.span.shares)
         return float(np.trapezoid(weights * values, speeds) / np.trapezoid(weights, speeds))
+
+
+@dataclass(frozen=True, eq=False)
+class RangeResponses(ResultDetails):
+    """Responses over the speed ranges of a problem, of its initial and its final design.
+
+    Attributes
+    ----------
+    initial, final
+        Response over each range.
+    rounds
+        Count of problems that were solved.
+    """
+
+    initial: tuple[Response, ...]
+    final: tuple[Response, ...]
+    rounds: int
 
 
 def _peak(share: Callable[[float], float], samples: Array, k: int) -> float:

@@ -6,17 +6,19 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import ClassVar, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 
-from laufruhe.files.measures import QuantityTable
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.processes import call_by_name
 from laufruhe.present.numbers import RPM
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Drawing, Extra, Path, Problem, Rebuild
+
+if TYPE_CHECKING:
+    from laufruhe.files.measures import QuantityTable
 
 _WORST_OF = "laufruhe.extensions.worst_mean.norm:worst_of"
 WORST = ("mean", "worst mean", "rms", "maximum")

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from laufruhe.extensions.speed_ranges.exchange import RangeResponses
-from laufruhe.extensions.speed_ranges.peaks import Response
+from laufruhe.extensions.speed_ranges.peaks import RangeResponses, Response
 from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import RPM, figure, number
 from laufruhe.present.pictures import ResultPicture
