@@ -146,6 +146,22 @@ def test_limits_of_run_ups_are_not_excluded_beside_what_few_angles_read() -> Non
 
 
 @pytest.mark.slow
+def test_a_worst_mean_is_decided_under_a_limit_of_a_run_up() -> None:
+    """Starts of the search give its largest mean, which depends on the softness of the program."""
+    travel = {"limit": "run-up travel", "max": "1.9 mm"}
+    results = [
+        laufruhe.solve(on_open_mounts(
+            0, run_up={"up_to": "1500 rpm", "time": "0.2 s"}, objective={"minimise": quantity}, constraints=[travel]
+        ))
+        for quantity in ("worst mean mount force", "mean mount force")
+    ]  # fmt: skip
+    assert [result.certificate.kind for result in results] == [Proof.GLOBAL] * 2
+    worst, mean = (result.objective.value for result in results)
+    assert worst == pytest.approx(mean, rel=1e-4)
+    assert worst > 29.2
+
+
+@pytest.mark.slow
 def test_limits_of_a_run_up_are_decided_by_from_a_good_start_too() -> None:
     """A design as given that keeps them is not taken for the best because a better one breaks a step or two."""
     problem = laufruhe.load(READY).at(Fidelity(samples=720, mounts="rigid"))

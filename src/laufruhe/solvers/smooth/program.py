@@ -355,9 +355,9 @@ class SmoothProgram:
             parts += self._modes.start(mounting_in(self.problem.design(list(mounts), self._decisions)))
         if self._constraints.heads:
             inputs = [self._mount_variables, self._unbalance_columns, self._throw_deviations, self._simulated.symbols]
+            inputs.append(self._softness)
             values = ca.Function("tops", inputs, [ca.vertcat(*(value for _, value in self._constraints.heads))])
-            outputs = values(
-                self._to_variables(mounts), columns, throw_deviations, self._simulated.peaks_at(mounts, columns)
-            )
+            peaks, softness = self._simulated.peaks_at(mounts, columns), self.program.stages[0]
+            outputs = values(self._to_variables(mounts), columns, throw_deviations, peaks, *softness)
             parts.append(1.05 * np.asarray(outputs, dtype=float).reshape(-1))
         return np.concatenate(parts)
