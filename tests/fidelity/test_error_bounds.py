@@ -16,7 +16,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers.accuracy import objective_error
 
 # the first of ten thousand engines, and all of them a thousand at a time
-SHARES = [(0, 30), (30, 70), *((first, 1000) for first in range(0, 10_000, 1000))]
+SHARES = [(0, 30), (30, 20), *((first, 1000) for first in range(0, 10_000, 1000))]
 
 
 def _sampling_errors(seed: int) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS
 
 # the first of ten thousand engines, and all of them a thousand at a time
-SHARES = [(0, 30), (30, 70), *((first, 1000) for first in range(0, 10_000, 1000))]
+SHARES = [(0, 30), (30, 20), *((first, 1000) for first in range(0, 10_000, 1000))]
 
 
 def _fidelity(rng: random.Random) -> Fidelity:

@@ -74,15 +74,15 @@ def test_a_stated_deviation_belongs_to_its_file() -> None:
 
 @pytest.mark.slow
 def test_intervals_hold_true_numbers() -> None:
-    # 95 % of 300 engines by `synthetic.py`; with 100 intervals fewer than 87 have a chance of 0.1 %
+    # 95 % of 300 engines by `synthetic.py`; with 60 intervals fewer than 50 have a chance of 0.1 %
     found = [
         inside
-        for seed in range(20)
+        for seed in range(12)
         for truth in (engine(seed),)
         for inside in hits(truth, estimate(measured(truth, np.random.default_rng(seed + 10_000), 0.05)))
     ]
-    assert len(found) > 90
-    assert np.mean(found) > 0.87
+    assert len(found) > 54
+    assert np.mean(found) > 0.83
 
 
 def test_two_discs_in_one_plane_cannot_be_told_apart() -> None:

@@ -44,7 +44,7 @@ TOGETHER = changed(FEWER, "[objective]", f"{WEIGHT}[objective]")
 FIXED_ROD = changed(
     TOGETHER, '{ diameter = { between = ["8 mm", "25 mm"], start = "20 mm" } }', '{ diameter = "16 mm" }'
 )
-TOLERANCE = 1e-3
+TOLERANCE = 5e-3
 
 
 @pytest.fixture(scope="module")
