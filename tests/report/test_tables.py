@@ -349,3 +349,12 @@ def test_modes_that_no_load_moves_are_named() -> None:
     still = [row[0] for row in modes.rows if row[2] == "no"]
     assert still
     assert f"No load moves the block in {', '.join(still)}" in modes.note
+
+
+def test_the_table_of_orders_has_the_largest_of_every_column() -> None:
+    """A single has many roll moments of gas, and two orders of shaking force; both stay in the table."""
+    result = laufruhe.evaluate(laufruhe.load(PROBLEMS / "tractor-single.toml"))
+    table = loads.orders(result)[0]
+    assert len(table.rows) == loads.MAX_ORDERS
+    assert {"1", "2"} <= {row[0] for row in table.rows}
+    assert "with the largest of every column" in table.note

@@ -228,11 +228,12 @@ def explained(result: Result) -> str:
             f"At this design {_conditions(c.kkt_residual)}. {bound if c.is_useful else NO_BOUND.capitalize() + '.'}"
         )
     gap = f"a gap of {share(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
+    # a large residual, as of a length at zero, says nothing beside a proof
+    conditions = f", and {_conditions(c.kkt_residual)}" if c.kkt_residual <= LARGE_RESIDUAL else ""
     return (
         f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; "
         f"this one has {figure(o.value, o.unit, 6)}, {gap} (proof: {c.kind}). "
-        f"The bound was not taken from the solver but computed from the exact model ({c.method}), "
-        f"and {_conditions(c.kkt_residual)}."
+        f"The bound was not taken from the solver but computed from the exact model ({c.method}){conditions}."
     )
 
 
@@ -240,6 +241,6 @@ def _conditions(residual: float) -> str:
     if not math.isfinite(residual):
         return "the optimality conditions are not known, because no search ended there"
     if residual > LARGE_RESIDUAL:
-        return f"the optimality conditions are met to {share(residual)} only; no bound depends on them"
+        return "the optimality conditions are not confirmed, as at a kink of the objective; no bound depends on them"
     how = f"with a residual of {residual:.1e}" if residual else "exactly"
     return f"the optimality conditions hold {how}"

@@ -121,19 +121,27 @@ def _orders(
     table = factors * np.stack([pad_orders(column, length) for column in series], axis=1)
     # a quantity has one scale, before and after
     scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
-    weight = (table / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
-    present = np.flatnonzero(weight > SHARE)
-    largest = sorted(sorted(present, key=lambda j: -weight[j])[:MAX_ORDERS])
+    shares = table / np.where(scale > 0.0, scale, 1.0)
+    present = np.flatnonzero(shares.max(axis=1) > SHARE)
+    largest = sorted(_ranked(shares)[:MAX_ORDERS])
     base = float(result.initial.loads[k].wrench.base)
     cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in largest)
     rows = [(f"{j * base:g}", *row) for j, row in zip(largest, cells, strict=True)]
     sides = ("",) if len(designs) == 1 else (", initial", ", final")
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
-    selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
-    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. "
+    selection = "all orders" if len(present) == len(largest) else f"{len(largest)} of {len(present)} orders"
+    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum"
+    note += ". " if len(present) == len(largest) else ", with the largest of every column. "
     note += "orders.csv has every order at every operating point."
     units = ", ".join(dict.fromkeys(unit for unit, _ in units_of_names))
     return Table(head, rows, title=f"{title} at {result.problem.points[k].name} [{units}]", note=note)
+
+
+def _ranked(shares: Array) -> list[int]:
+    # orders by their best place in any column, then by their largest share of a column's maximum
+    places = np.argsort(np.argsort(-shares, axis=0, kind="stable"), axis=0)
+    best = np.where(shares > SHARE, places, len(shares)).min(axis=1)
+    return [int(j) for j in np.lexsort((-shares.max(axis=1), best)) if best[j] < len(shares)]
 
 
 def _components(first: int, loads: PointLoads) -> list[Array]:
