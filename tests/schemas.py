@@ -15,6 +15,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from laufruhe import units
 from laufruhe.files import problem_file, ready
 from laufruhe.files.catalogue import KEY, engines
 from laufruhe.files.fields import ANYWHERE, without_open
@@ -59,6 +60,7 @@ def explained(schema: dict[str, Any]) -> dict[str, Any]:
         own = entry.get("description")
         words = own if own and own != entry.get("x-dimension") else _words(schema, entry, f"{_short(name)}.{key}")
         hover = f"{words}\n\n{kind(schema, entry)}, for example `{json.dumps(example, ensure_ascii=False)}`"
+        hover += f", by default `{text}`" if (text := default(schema, entry)) else ""
         entry |= {"description": words, "examples": [example], "x-taplo": {"docs": {"main": hover}}}
     return schema
 
@@ -92,6 +94,29 @@ def kind(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
             kinds = one.get("type", "")
             words += [_PLAIN.get(each, "any value") for each in ([kinds] if isinstance(kinds, str) else kinds)]
     return ", ".join(dict.fromkeys(words))
+
+
+def default(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
+    """Return the default of a key as it stands in a file; empty without one."""
+    value = entry.get("default")
+    return (
+        ""
+        if value in (None, [], "") or isinstance(value, dict)
+        else json.dumps(_written(schema, entry, value), ensure_ascii=False)
+    )
+
+
+def _written(schema: Mapping[str, Any], entry: Mapping[str, Any], value: Any) -> Any:
+    """Return a value of the models as it stands in a file, numbers with their units."""
+    for one in alternatives(schema, entry):
+        if isinstance(value, list) and "items" in one:
+            return [_written(schema, one["items"], each) for each in value]
+        if isinstance(value, float) and "x-dimension" in one:
+            unit = units.unit_of_dimension(one["x-dimension"])
+            # pressures of gas are usual in bar, stresses in N/mm^2
+            is_gas = unit == "Pa" and value < 1e7
+            return f"{1e-5 * value:g} bar" if is_gas else units.quantity_text(value, unit, 6)
+    return value
 
 
 def _of_table(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:

@@ -14,14 +14,18 @@ from typing import Any, TypeAlias
 DOCS = Path(__file__).parents[1]
 sys.path.append(str(DOCS.parent / "tests"))
 
-from schemas import alternatives, kind  # noqa: E402
+from schemas import alternatives, default, kind  # noqa: E402
 
-HEAD = "| key | type | meaning | example |\n| --- | --- | --- | --- |\n"
+HEAD = "| key | type | meaning | default | example |\n| --- | --- | --- | --- | --- |\n"
 KEYS = """\
 # All keys
 
 Every key of problem and study files, from the schemas that editors use. *Number* is a plain number; a dimension means
 a number with a unit; *may be open* means that `{ between = [low, high] }` may stand in place of the number.
+
+The example shows how to write a value. The value that counts without the key is the *default*: `required` if the file
+must have the key, and blank if nothing is assumed or if the meaning says what follows. Keys of `[engine]` may also come
+from the catalogue, and those of a part of a study from `[study.common]`.
 """
 GALLERY = """\
 # Programs of the gallery
@@ -62,10 +66,11 @@ def which(table: dict[str, Any]) -> str:
     return next((f' {key} = "{entry["const"]}"' for key, entry in told if "const" in entry), "")
 
 
-def row(schema: dict[str, Any], key: str, entry: dict[str, Any]) -> str:
+def row(schema: dict[str, Any], key: str, entry: dict[str, Any], is_required: bool) -> str:
     """One key."""
+    usual = "required" if is_required else f"`{text}`" if (text := default(schema, entry)) else ""
     examples = ", ".join(f"`{shown(one)}`" for one in entry.get("examples", ()))
-    cells = (f"`{key}`", kind(schema, entry), entry.get("description", ""), examples)
+    cells = (f"`{key}`", kind(schema, entry), entry.get("description", ""), usual, examples)
     return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |\n"
 
 
@@ -73,7 +78,8 @@ def sections(schema: dict[str, Any], path: str, table: dict[str, Any], is_list: 
     """The section of a table, and then those of what stands in it, each table once."""
     name = f"`[[{path}]]`" if is_list else f"`[{path}]`" if path else "At the top of the file"
     told = [f"{table['description']}\n"] if "description" in table else []
-    rows = "".join(row(schema, key, entry) for key, entry in table["properties"].items())
+    needed = table.get("required", ())
+    rows = "".join(row(schema, key, entry, key in needed) for key, entry in table["properties"].items())
     yield "\n".join([f"### {name}{which(table)}\n", *told, HEAD + rows])
     for key, entry in table["properties"].items():
         for each, inner in tables_of(schema, entry):

@@ -18,7 +18,7 @@ from laufruhe import units
 from laufruhe.files.reader import load
 from laufruhe.files.ready import schema_file
 from problem_files import PROBLEMS, READY
-from schemas import WORDS, schema, study_schema
+from schemas import WORDS, alternatives, default, schema, study_schema
 
 LANCHESTER = next(path for path in READY if path.stem == "tractor-four-lanchester")
 STUDIES = [path for path in sorted(PROBLEMS.glob("*.toml")) if path not in READY]
@@ -177,6 +177,23 @@ def test_numbers_are_checked_with_their_unit(validator: jsonschema.Draft7Validat
         # a speed of rotation may be given as turns a second
         others = [other for other in NUMBERS if other != unit and (unit, other) != ("rad/s", "Hz")]
         assert not [other for other in others if found.match(units.example(other))]
+
+
+@pytest.mark.parametrize("is_study", [False, True], ids=["problem", "study"])
+def test_defaults_stand_with_their_units(is_study: bool) -> None:
+    """The text of a default is read as the number that counts without the key."""
+    tables = json.loads(schema_file(is_study=is_study)[1])
+    texts = {}
+    for name, table in tables["definitions"].items():
+        for key, entry in table.get("properties", {}).items():
+            dimensions = [one["x-dimension"] for one in alternatives(tables, entry) if "x-dimension" in one]
+            if dimensions and isinstance(entry.get("default"), float):
+                texts[name, key] = text = json.loads(default(tables, entry))
+                assert units.parse(text, units.unit_of_dimension(dimensions[0])) == pytest.approx(entry["default"])
+    assert texts
+    if not is_study:
+        assert texts["WiebeTable", "intake_pressure"] == "1.01325 bar"
+        assert default(tables, tables["definitions"]["WiebeTable"]["properties"]["heat_ratio"]) == "1.35"
 
 
 @pytest.fixture(scope="module")

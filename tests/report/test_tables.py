@@ -121,6 +121,7 @@ def test_a_page_alone_holds_the_problem() -> None:
     }
     assert rows["firing order"] == ["1-3-4-2, after 180, 180, 180, 180 deg"]
     assert rows["rotation"] == ["clockwise"]
+    assert "compression\\_exponent 1.35, expansion\\_exponent 1.3" in rows["gas, by default"][0]
     left = next(rotor for rotor in result.final.engine.rotors if rotor.name == "left")
     assert float(rows["left"][5]) == pytest.approx(1e6 * abs(left.unbalance), rel=1e-4)
     assert rows["cylinder 3"] == ["-62.5", "0", "180", "180", "100", "120", "230.77", "0", "1.25"]

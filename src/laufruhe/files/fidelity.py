@@ -29,7 +29,9 @@ class FidelityTable(Table):
         "Motion of the pistons; auto is exact, and takes fewer samples for many designs.",
         "exact",
     )
-    tolerance: f.Tolerance | None = f.optional("Relative error of the objective that auto may make.")
+    tolerance: f.Tolerance | None = f.optional(
+        f"Relative error of the objective that auto may make; {DEFAULT_TOLERANCE} by default."
+    )
     rod: RodModel | None = None
     gas: bool | None = f.optional("false leaves the working gas out.")
     gas_samples: Steps | None = f.optional("Steps of the gas torque over the working cycle.")

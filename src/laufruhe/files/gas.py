@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -31,7 +31,7 @@ from laufruhe.machine import (
     Wiebe,
 )
 from laufruhe.machine.chambers import CommonGas, CylinderGases
-from laufruhe.machine.gas import AMBIENT_PRESSURE
+from laufruhe.machine.gas import AMBIENT_PRESSURE, Charge
 from laufruhe.physics.gas_cycle import chamber_cycle_of, check_chamber
 
 
@@ -103,10 +103,10 @@ class SingleGasTable(Table):
 class ChargeTable(Table):
     """Charge and gas exchange of a computed cycle."""
 
-    compression_ratio: f.Positive | None = None
-    intake_pressure: f.PositivePressure | None = None
-    exhaust_pressure: f.PositivePressure | None = None
-    crankcase_pressure: f.PositivePressure | None = None
+    compression_ratio: f.Positive = Charge.compression_ratio
+    intake_pressure: f.PositivePressure = Charge.intake_pressure
+    exhaust_pressure: f.PositivePressure = Charge.exhaust_pressure
+    crankcase_pressure: f.PositivePressure = Charge.crankcase_pressure
 
 
 class FiredTable(Table):
@@ -128,8 +128,8 @@ class SeiligerTable(ChargeTable, FiredTable):
     imep: f.MeanPressure | None = f.optional(
         "Indicated mean effective pressure; needed unless every operating point has a load of its own."
     )
-    compression_exponent: f.Positive | None = None
-    expansion_exponent: f.Positive | None = None
+    compression_exponent: f.Positive = Seiliger.compression_exponent
+    expansion_exponent: f.Positive = Seiliger.expansion_exponent
 
 
 class WiebeTable(ChargeTable, FiredTable):
@@ -142,9 +142,9 @@ class WiebeTable(ChargeTable, FiredTable):
     )
     start: f.Angle
     duration: f.Angle
-    shape: f.NonNegative | None = None
-    completeness: f.Positive | None = None
-    heat_ratio: f.Positive | None = None
+    shape: f.NonNegative = Wiebe.shape
+    completeness: f.Positive = Wiebe.completeness
+    heat_ratio: f.Positive = Wiebe.heat_ratio
 
 
 class RecordedGasTable(RecordedTable):
@@ -171,18 +171,31 @@ class TraceTable(RecordedGasTable, FiredTable):
     """A recorded cylinder pressure."""
 
     model: Literal["trace"]
-    crankcase_pressure: f.PositivePressure | None = None
+    crankcase_pressure: f.PositivePressure = AMBIENT_PRESSURE
 
 
 class ChambersTable(Table):
     """Chambers on both sides of the pistons: steam engines, pumps, and both on one rod."""
 
     model: Literal["chambers"]
-    crankcase_pressure: f.PositivePressure | None = f.optional("Absolute pressure of the ambient air.")
+    crankcase_pressure: f.PositivePressure = f.optional("Absolute pressure of the ambient air.", AMBIENT_PRESSURE)
     chambers: Annotated[list[ChamberTable], Field(min_length=1, max_length=100)]
 
 
 GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable | ChambersTable, Field(discriminator="model")]
+
+
+_MODELS: Mapping[str, type[Table]] = {
+    "seiliger": SeiligerTable, "wiebe": WiebeTable, "trace": TraceTable, "chambers": ChambersTable,
+}  # fmt: skip
+
+
+def default_numbers(gas: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield key and text of each number that [gas] of a file leaves to its default."""
+    for key, field in _MODELS[gas["model"]].model_fields.items():
+        if key not in gas and isinstance(field.default, float):
+            unit = next(one.unit for one in field.metadata if isinstance(one, f.Number))
+            yield key, f"{1e-5 * field.default:g} bar" if unit == "Pa" else f"{field.default:g}"
 
 
 def needs_bore(table: GasTable | None) -> bool:
@@ -199,7 +212,7 @@ def gas_of(
     """
     if table is None:
         return None
-    air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
+    air = table.crankcase_pressure
     with errors_at_key("gas"):
         if isinstance(table, ChambersTable):
             if cycle is not Cycle.TWO_STROKE:

@@ -75,7 +75,8 @@ class QuantityTable(Table):
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
     alternating: bool | None = f.optional(
-        "Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no part."
+        "Whether the mean of a load over the cycle is left out, and with it the steady reaction to the mean torque; "
+        "false by default."
     )
     direction_weights: f.Three[f.NonNegative] | None = None
     load_cases: list[str] | None = f.optional("Load cases that count, by name; all by default.")

@@ -141,7 +141,8 @@ class SearchTable(Table):
         default=None,
         ge=0,
         le=1_000_000,
-        description="Number of boxes into which bounds may be divided for a proof; 0 for none.",
+        description="Number of boxes into which bounds may be divided for a proof; 0 for none. "
+        "By default each method has its own number.",
     )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.errors import counted
+from laufruhe.files.gas import default_numbers
 from laufruhe.files.numbering import USUAL
 from laufruhe.machine import Engine, Mount, Rotor, SliderCrank
 from laufruhe.machine.layouts import LAYOUTS
@@ -66,6 +67,8 @@ def _engine_rows(problem: Problem, engine: Engine) -> Iterator[tuple[str, str]]:
             "gas",
             ", ".join(f"{key} {value}" for key, value in tables["gas"].items() if isinstance(value, str | int | float)),
         )
+        if defaults := ", ".join(f"{key} {text}" for key, text in default_numbers(tables["gas"])):
+            yield "gas, by default", defaults
     if engine.block is not None:
         yield "mass on the mounts", with_unit(engine.block.mass, "kg")
 

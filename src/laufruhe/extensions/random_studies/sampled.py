@@ -34,7 +34,9 @@ class Sampled(Part):
 
     draws: Annotated[int, Field(ge=1, le=MAX_DRAWS)] = f.required("Number of draws of each case.")
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1964
-    chunk: Annotated[int | None, Field(ge=1, le=1_000_000)] = f.optional("Draws in one piece of work.")
+    chunk: Annotated[int | None, Field(ge=1, le=1_000_000)] = f.optional(
+        "Draws in one piece of work; 10000 designs or 1000 problems by default."
+    )
     own_chunk: ClassVar[int] = 1000
 
     def settings(self) -> dict[str, Any]:
