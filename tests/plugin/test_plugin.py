@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 import os
@@ -11,7 +12,11 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from laufruhe.numerics.norms import Grid
+from laufruhe.numerics.spectrum import Spectrum
 
 HERE = Path(__file__).parent
 UNBALANCE = (3.0 * 0.8 + 0.6) * 0.045
@@ -43,6 +48,20 @@ def installed(folder: Path, points: str | None = None) -> dict[str, str]:
 def laufruhe(environment: dict[str, str], *words: str | Path) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "laufruhe", *map(str, words)]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_norm_of_a_package_stays_below_its_bound() -> None:
+    """A sine of two amplitudes, whose orders add up at one angle."""
+    path = HERE / "laufruhe_example" / "worst_twentieth.py"
+    spec = importlib.util.spec_from_file_location("worst_twentieth", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    norm, signal = module.WorstTwentieth(), Spectrum(1, np.array([[0.0], [3.0], [1.0]]))
+    rows = signal.sample(720)
+    value = norm.value(Grid(np.full(len(rows), 1.0 / len(rows)), len(rows)), rows)
+    assert 0.9 * norm.upper_bound([signal], np.ones(1)) <= value <= norm.upper_bound([signal], np.ones(1))
 
 
 @pytest.mark.slow

@@ -51,7 +51,10 @@ def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve:
     }
     left_out = " and ".join(counted(count, name) for name, count in counts.items() if count)
     result = with_better_bound(result, certificate.lower_bound, f"bound without {left_out}")
-    return result if candidate is None or _value(result) <= _value(candidate) else candidate
+    if candidate is None or _value(result) <= _value(candidate):
+        return result
+    other = result.certificate
+    return candidate if other is None else with_better_bound(candidate, other.lower_bound, other.method)
 
 
 def _with_all_limits(problem: Problem, proven: Result) -> Result | None:

@@ -26,7 +26,7 @@ class WorstTwentieth(Norm):
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return a bound of the largest length."""
-        return MAXIMUM.above(signals, shares)
+        return MAXIMUM.upper_bound(signals, shares)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """Return how far samples can miss the largest length, which is more than what they miss of a mean."""

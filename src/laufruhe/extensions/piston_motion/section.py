@@ -60,8 +60,9 @@ def _tables(result: Result) -> list[Table]:
     }  # fmt: skip
     head = ("at", "cylinder", *(f"{word} [{readable(unit)[0]}]" if unit else word for word, unit in units.items()))
     note = (
-        'Final design, at the mean speed of the crank. Crank angles stand behind "at" [deg]. Reversals: how often '
-        "the side force changes its sign in a cycle, and its rate at the fastest reversal, a measure of piston slap."
+        "Final design, at the mean speed of the crank. Angles behind 'at' [deg]: own crank after top dead centre. "
+        "Reversals: how often the side force changes its sign in a cycle, and its rate at the fastest reversal, a "
+        "measure of piston slap."
     )
     return [Table(head, texts, title="Motion of the pistons", left=2, note=note, file="piston-motion")]
 
