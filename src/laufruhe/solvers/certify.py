@@ -138,7 +138,7 @@ def _proof_of(reference: Result, design: Design) -> ProofData:
         bound, method = certificate.lower_bound, f"bound of a solve: {certificate.method}"
         is_exact = certificate.kind in (Proof.GLOBAL, Proof.WITHIN_GAP)
     strength = ProofStrength.EXACT if is_exact else ProofStrength.RELAXED
-    # the gap of a feasible design bounds stationarity and complementarity
+    # without multipliers, the gap and the violation stand for the residual
     gap = relative_gap(design.value, bound, numerical_zero(design.problem, design.evaluation.engine))
     return ProofData(bound, strength, max(design.violation, gap, 0.0), method, reference.prices)
 
