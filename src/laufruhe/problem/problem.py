@@ -87,9 +87,18 @@ class Extra:
         """Names of the open numbers that the extension decides."""
         return ()
 
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of the limits that the extension adds."""
+        return ()
+
     def objective_name(self, name: str) -> str:
         """Return the name of the objective with this extension, from its name without."""
         return name
+
+    def evaluated(self, _problem: Problem, result: Any, /) -> Any:
+        """Return the result of the initial design of a problem with what the extension evaluates."""
+        return result
 
 
 E = TypeVar("E", bound=Extra)
@@ -210,7 +219,8 @@ class Problem(Goals, Statements):
     def summary(self) -> str:
         """Description of the problem and its open numbers in one line."""
         engine = self.engine
-        numbers = {"mount": engine.mounts, "operating point": self.points, "limit": self.limits}
+        limits = (*self.limits, *(name for extra in self.extras for name in extra.limit_names))
+        numbers = {"mount": engine.mounts, "operating point": self.points, "limit": limits}
         parts = [self.name, counted(len(engine.cylinders), "cylinder"), str(engine.cycle)]
         parts += [counted(len(parts_of_kind), name) for name, parts_of_kind in numbers.items()]
         return ", ".join(parts) + "; open: " + (", ".join(self.open_names) or "nothing")

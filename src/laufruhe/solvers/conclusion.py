@@ -292,12 +292,12 @@ def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
 
     If `allow_resonance` is True, the design may stand on an undamped resonance, as the start of a search may.
     """
-    started = time.perf_counter()
+    started, requested = time.perf_counter(), problem
     problem = problem.drawing
     evaluation = evaluate_start(problem) if allow_resonance else evaluate(problem)
     phasing = problem.phasing
     reason = why_no_order(phasing, phasing.throws) if phasing is not None and phasing.throws is not None else ""
-    return Result(
+    result = Result(
         problem=problem,
         status=Status.INFEASIBLE if reason else Status.FEASIBLE,
         message=reason,
@@ -308,6 +308,9 @@ def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
         error=float if evaluation.resonance else partial(objective_error, problem, evaluation),
         timing={"evaluate": time.perf_counter() - started},
     )
+    for extra in () if allow_resonance else requested.extras:
+        result = extra.evaluated(requested, result)
+    return result
 
 
 def quote_names(names: Iterable[str]) -> str:

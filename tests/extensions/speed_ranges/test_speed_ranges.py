@@ -20,6 +20,7 @@ from laufruhe.extensions.speed_ranges.ranges import SpeedRanges
 from laufruhe.extensions.speed_ranges.section import SECTION
 from laufruhe.extensions.worst_mean.norm import WorstRms
 from laufruhe.numerics.norms import RMS, Grid
+from laufruhe.present.measures import is_met
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import evaluate_start
 
@@ -248,6 +249,22 @@ def test_the_mean_has_the_shares_of_time(tmp_path: Path) -> None:
     shares = 'time_shares = [["1500 rpm", 0], ["6990 rpm", 0], ["7000 rpm", 1]]\n'
     _, late = found(written(tmp_path, shares))
     assert late.mean == pytest.approx(late.values[-1], rel=1e-2)
+
+
+def test_an_evaluation_shows_ranges_and_the_state_of_their_curves(tmp_path: Path) -> None:
+    curve = 'quantity = "rms receiver acceleration"\nmax = "1 mm/s^2"\n[[speed_ranges]]\nname = "whole"\n'
+    problem = laufruhe.load(written(tmp_path, f'{curve}speeds = ["1500 rpm", "7000 rpm"]\nminimise = true\n'))
+    assert ", 1 limit;" in problem.summary
+    result = laufruhe.evaluate(problem)
+    (table,) = SECTION.tables(result)
+    assert [row[:2] for row in table.rows] == [("all", "initial"), ("whole", "initial")]
+    _, response = found(written(tmp_path))
+    worst = response.values[response.worst]
+    assert result.objective is not None
+    assert result.objective.name == "worst rms receiver acceleration over whole"
+    assert result.objective.value == pytest.approx(worst)
+    assert max(limit.value for limit in result.limits) == pytest.approx(worst)
+    assert not any(is_met(limit) for limit in result.limits)
 
 
 def test_worst_rms_is_a_norm_with_its_dual() -> None:

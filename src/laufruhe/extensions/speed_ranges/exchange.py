@@ -54,8 +54,13 @@ def refuse(problem: Problem) -> None:
     others = [extra.words for extra in problem.extras if not isinstance(extra, SpeedRanges)]
     if others:
         raise ModelError(f"speed ranges are not decided together with {others[0]}; remove one of both tables")
+    _refuse_ranges(problem)
+    methods.refuse(at_speeds(problem, ranges, {span.name: (span.low, span.high) for span in ranges}))
+
+
+def _refuse_ranges(problem: Problem) -> None:
     context = MeasureContext(problem.engine, problem.points)
-    for k, span in enumerate(ranges, 1):
+    for k, span in enumerate(_ranges_of(problem), 1):
         if span.table is not None:
             try:
                 context.measure(span.quantity, span.table, f"speed_ranges[{k}].quantity")
@@ -64,7 +69,6 @@ def refuse(problem: Problem) -> None:
                 raise InputError(path, (error.complaint,)) from None
         if not problem.objective and span.measure is None:
             raise ModelError(f"speed range '{span.name}' needs a quantity, because the problem has no objective")
-    methods.refuse(at_speeds(problem, ranges, {span.name: (span.low, span.high) for span in ranges}))
 
 
 def solve_ranges(problem: Problem, decide: Callable[[Problem], Result], _: Callable[[Problem], Result]) -> Result:
@@ -99,6 +103,21 @@ def solve_ranges(problem: Problem, decide: Callable[[Problem], Result], _: Calla
         raise SolverError("no design for the speed ranges was found within the time limit; raise the time limit")
     result, final, used = best
     return _conclusion(base, ranges, used, result, bound, RangeResponses(initial, final, rounds))
+
+
+def evaluate_ranges(problem: Problem, result: Result) -> Result:
+    """Return the result of an initial design with its responses over the ranges, and limits at their peaks."""
+    _refuse_ranges(problem)
+    ranges, base = _ranges_of(problem), problem.changed(extras=(), origin=problem.origin)
+    responses = tuple(Response(base, result.initial, span) for span in ranges)
+    peaks = _sorted({one.span.name: {*_tops(one)[:PEAKS_IN_TABLES], *_tops(one)[-2:]} for one in responses})
+    at_peaks = at_speeds(base, ranges, peaks)
+    design = evaluate(at_peaks)
+    return replace(
+        result, problem=at_peaks, initial=design, final=design, details=RangeResponses(responses, responses, 0),
+        objective=ObjectiveValue.of_initial(at_peaks, design), limits=limit_values(at_peaks, design),
+        error=partial(objective_error, at_peaks, design),
+    )  # fmt: skip
 
 
 def _rank(result: Result, final: Sequence[Response]) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -95,6 +95,15 @@ class SpeedRanges(Extra):
 
     words: ClassVar[str] = "speed ranges"
     ranges: tuple[SpeedRange, ...] = field(default=())
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of the ranges with a limit that is a curve."""
+        return tuple(span.name for span in self.ranges if span.limit is not None)
+
+    def evaluated(self, problem: Problem, result: Any, /) -> Any:
+        """Return the result of the initial design at its peaks over the ranges."""
+        return call_by_name("laufruhe.extensions.speed_ranges.exchange:evaluate_ranges", problem, result)
 
     def objective_name(self, name: str) -> str:
         """Return the name of the worst value over the range that is minimised, from the name of its measure."""
