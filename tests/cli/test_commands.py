@@ -21,7 +21,7 @@ from laufruhe.numerics.cores import ONE_THREAD
 from problem_files import PROBLEMS, written
 
 PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
-TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv", "piston-motion.csv"}
+TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv", "piston-motion.csv", "side-force-reversals.csv"}
 DECIDED = {"shafts.csv", "decisions.csv", "limits.csv", "weights.csv"}
 ALL_FILES = PAGES | TABLES | DECIDED
 ALL_FILES |= {f"{name}.svg" for name in ("engine", "polar", "ellipses", "cycle", "bars", "spectrum")}

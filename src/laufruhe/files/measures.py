@@ -15,6 +15,7 @@ from laufruhe.errors import ModelError
 from laufruhe.extension import HOMES, missing_extension
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, nearest, require_one_of, si_value
+from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.clearances import shafts_of
@@ -155,7 +156,12 @@ class MeasureContext:
             ]  # fmt: skip
             if homes:
                 raise Refused(where, name, *missing_extension(homes[0]))
-            usual = _HIGHEST.sub("maximum", name)
+            words = name.rpartition(".")[2].replace("_", " ")
+            if words.replace(" ", "_") in EngineTable.model_fields and words not in MEASURES:
+                rule = "is a number of the file, and no quantity"
+                remedy = "limit it by its bounds, or compare its values by laufruhe.evaluate_many in Python"
+                raise Refused(where, name, rule, remedy)
+            usual = _HIGHEST.sub("maximum", words)
             raise Refused(where, name, "is no quantity", nearest(usual, list(MEASURES)))
         channel, key = MEASURES[name][0], where.rsplit(".", 1)[0]
         if not channel.needs.of(self.engine):

@@ -77,8 +77,8 @@ QuantityName: TypeAlias = Literal[
     "kinetic-energy decoupling", "decoupling shortfall", "torque-roll residual", "raw torque-roll residual",
     "total stiffness", "static travel", "static mount force", "shaft distance", "shaft clearance", "envelope radius",
     "parts price", "piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle",
-    "side-force reversal rate", "apex speed", "apex acceleration", "run-up force", "run-up travel", "run-up twist",
-    "throw clearance", "running-gear mass", "torsional frequencies", "critical speeds", "absorber heat",
+    "rod length", "side-force reversal rate", "apex speed", "apex acceleration", "run-up force", "run-up travel",
+    "run-up twist", "throw clearance", "running-gear mass", "torsional frequencies", "critical speeds", "absorber heat",
 ] | str
 """Quantities that may be minimised or limited; those of extensions of users are texts."""
 

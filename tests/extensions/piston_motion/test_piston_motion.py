@@ -20,6 +20,7 @@ from laufruhe.machine import SliderCrank
 from laufruhe.problem.channels import SIDE_FORCE
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.json_result import as_json
+from laufruhe.report.tables import number_tables
 from problem_files import PROBLEMS
 
 SPEED = 300.0
@@ -162,6 +163,19 @@ def test_a_limit_on_the_rod_angle_has_its_closed_form() -> None:
     assert (limit.limit, limit.active) == (pytest.approx(math.radians(15.0)), False)
 
 
+def test_the_shortest_rod_under_a_limit_has_its_closed_form() -> None:
+    tables = file(
+        rod_length={"between": ["100 mm", "260 mm"], "start": "220 mm"}, objective={"minimise": "rod length"},
+        constraints=[{"limit": "piston acceleration", "max": "5000 m/s^2"}],
+    )  # fmt: skip
+    result = laufruhe.solve(tables)
+    radius, speed = 0.04, 100.0 * math.pi
+    # r w^2 (1 + r / l) = 5000 m/s^2
+    assert result.objective is not None
+    assert result.objective.value == pytest.approx(radius / (5000.0 / (radius * speed**2) - 1.0), rel=1e-5)
+    assert result["piston acceleration"] <= 5000.0 * (1 + 1e-9)
+
+
 def test_a_limit_that_no_throw_moves_keeps_the_proof() -> None:
     text = (PROBLEMS / "inline-five-open.toml").read_text(encoding="utf-8")
     limited = text + '\n[[constraints]]\nlimit = "piston speed"\nmax = "100 m/s"\n'
@@ -179,6 +193,8 @@ def test_a_limit_that_no_throw_moves_keeps_the_proof() -> None:
     [
         (file(objective={"minimise": "piston speeds"}), "is no quantity; did you mean 'piston speed'?"),
         (file(objective={"minimise": "maximum piston speed"}), "is no quantity; did you mean"),
+        (file(objective={"minimise": "engine.rod_length"}), "is no quantity; did you mean 'rod length'?"),
+        (file(objective={"minimise": "offset"}), "is a number of the file, and no quantity; limit it by its bounds"),
         (file(constraints=[{"limit": "piston speed", "min": "2 m/s"}]), "cannot stand beside piston speed"),
         (file(constraints=[{"limit": "rod angle", "max": "2 m"}]), "is not a unit of an angle"),
         (
@@ -208,6 +224,10 @@ def test_report_and_record() -> None:
     assert max(one["rate"] for one in record["side_force_reversals"]) == pytest.approx(
         result.objective.value, rel=1e-12
     )
+    rows = number_tables(result)["side-force-reversals"].rows
+    assert [(math.radians(angle), rate) for _, _, angle, rate in rows] == [
+        pytest.approx((one["angle"], one["rate"])) for one in record["side_force_reversals"]
+    ]
     (table,) = SECTION.tables(result)
     assert table.rows[0][:3] == ("3000 rpm", "1", "80.00")
     assert record["stroke"] == pytest.approx(0.08, rel=1e-12)

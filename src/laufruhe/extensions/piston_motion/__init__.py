@@ -3,12 +3,12 @@
 from laufruhe.extension import Extension
 
 _HERE = "laufruhe.extensions.piston_motion"
-_OF_SHAPE = ("piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle")
+_OF_SHAPE = ("piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle", "rod length")
 EXTENSION = Extension(
     "piston_motion",
     channels=tuple(
         f"{_HERE}.channels:{name}"
-        for name in ("TRAVEL", "MEAN_SPEED", "SPEED", "ACCELERATION", "ROD_ANGLE", "REVERSAL_RATE")
+        for name in ("TRAVEL", "MEAN_SPEED", "SPEED", "ACCELERATION", "ROD_ANGLE", "ROD_LENGTH", "REVERSAL_RATE")
     ),
     dependences=(
         # an open rod length may be a size

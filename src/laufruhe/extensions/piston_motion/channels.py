@@ -55,4 +55,7 @@ ACCELERATION = _channel("piston acceleration", "m/s^2", PISTONS, _of_motion(lamb
 ROD_ANGLE = _channel(
     "rod angle", "rad", RODS, _of_motion(lambda motion: motion.rod_angle.value if motion.rod_angle else 0.0)
 )
+ROD_LENGTH = _channel(
+    "rod length", "m", RODS, lambda engine, _: [part.rod_length for part in engine.slider_cranks], ("min", "max")
+)
 REVERSAL_RATE = _channel("side-force reversal rate", "N/s", RODS, _fastest_reversals, depends_on_loads=True)

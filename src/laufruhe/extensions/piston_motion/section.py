@@ -23,9 +23,14 @@ def _has_pistons(result: Result) -> bool:
     return bool(result.final.loads) and bool(pistons_of(result.final.engine))
 
 
+def _has_side_forces(result: Result) -> bool:
+    engine = result.final.engine
+    return _has_pistons(result) and bool(RODS.of(engine)) and has_bearing_loads(engine, result.final.fidelity)
+
+
 def _motions(result: Result) -> Iterator[tuple[PointLoads, SliderCrank, PistonMotion, Sequence[Extreme] | None]]:
     engine = result.final.engine
-    has_side_force = RODS.of(engine) and has_bearing_loads(engine, result.final.fidelity)
+    has_side_force = _has_side_forces(result)
     for loads in result.final.loads:
         sets = reversals_at(engine, loads) if has_side_force else [None] * len(engine.slider_cranks)
         for part, reversals in zip(engine.slider_cranks, sets, strict=True):
@@ -67,6 +72,15 @@ def _tables(result: Result) -> list[Table]:
     return [Table(head, texts, title="Motion of the pistons", left=2, note=note, file="piston-motion")]
 
 
+def _reversals(result: Result) -> Table:
+    rows = [
+        (loads.point.name, part.name, math.degrees(one.angle), one.value)
+        for loads, part, _, reversals in _motions(result)
+        for one in reversals or ()
+    ]
+    return Table(("point", "cylinder", "own crank angle after top dead centre [deg]", "rate [N/s]"), rows, left=2)
+
+
 def _text(value: float, unit: str) -> str:
     return number(value * readable(unit)[1])
 
@@ -75,4 +89,7 @@ def _at(extreme: Extreme, unit: str) -> str:
     return f"{_text(extreme.value, unit)} at {trimmed(round(math.degrees(extreme.angle), 1) + 0.0)}"
 
 
-SECTION = Section("piston_motion", _has_pistons, _tables, _record, ("piston-motion",))
+SECTION = Section(
+    "piston_motion", _has_pistons, _tables, _record, ("piston-motion",),
+    {"side-force-reversals": (_has_side_forces, _reversals)},
+)  # fmt: skip
