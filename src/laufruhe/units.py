@@ -368,6 +368,11 @@ def readable(unit: str, usual: str = "") -> tuple[str, float]:
     return name.replace("^2", "²").replace("^3", "³"), factor
 
 
+def readable_unbalance(largest: float) -> tuple[str, float]:
+    """Return the unit of reports for unbalances up to the largest one [kg m], and the factor: g mm, or kg m from 1."""
+    return readable("kg m", "g mm" if largest < 1.0 else "kg m")
+
+
 def is_shown(unit: str) -> bool:
     """Return True if a user wants to read an SI unit in a unit of his own."""
     return unit in _preferences.get()

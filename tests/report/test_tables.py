@@ -13,11 +13,13 @@ import pytest
 import laufruhe
 from cli import scenes
 from laufruhe.present.gas_figures import gas_head, gas_rows
+from laufruhe.present.numbers import in_grams
 from laufruhe.present.tables import Table, escape_markdown, strip_markdown
 from laufruhe.report.document import Bullets, Document, Paragraph
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show, show_document
 from laufruhe.report.sections import elastic, loads, tables_of
+from laufruhe.report.sections.weights import weights
 from laufruhe.report.wording import added_loads, explained, headline, why_star
 from laufruhe.solvers import Result
 from laufruhe.studies.text import marked_table
@@ -359,3 +361,18 @@ def test_the_table_of_orders_has_the_largest_of_every_column() -> None:
     assert len(table.rows) == loads.MAX_ORDERS
     assert {"1", "2"} <= {row[0] for row in table.rows}
     assert "with the largest of every column" in table.note
+
+
+@pytest.mark.parametrize(("size", "words"), [(0.5, " = 500000 g mm"), (2.0, "")])
+def test_a_large_unbalance_is_in_kilogram_metres(size: float, words: str) -> None:
+    """A million g mm is 1 kg m; the second column in kg m is then the same, and is left out."""
+    text = _OPEN_FACTOR.replace(
+        "balance_factor = { between = [0, 1] }", f'x = "0 mm", angle = 180, unbalance = "{size} kg m"'
+    )
+    (table,) = weights(laufruhe.evaluate(laufruhe.load(text)))
+    unit = "g mm" if words else "kg m"
+    assert [head for head in table.head if "unbalance" in head] == list(
+        dict.fromkeys([f"unbalance [{unit}]", "unbalance [kg m]"])
+    )
+    assert float(table.rows[0][2]) == pytest.approx(size * (1e6 if words else 1.0))
+    assert in_grams(size, "kg m", size) == words

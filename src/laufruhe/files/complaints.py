@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
@@ -164,8 +164,9 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         extension_homes = HOMES["keys"] if len(loc) == 1 else of_table
         if str(loc[-1]) in extension_homes:
             return Complaint(where, "", *missing_extension(extension_homes[str(loc[-1])]))
-        keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
-        remedy = _key_remedy(str(loc[-1]), keys, model)
+        fields = {field.alias or name: field for table in tables[:1] for name, field in table.model_fields.items()}
+        keys_of_tables = {key for key, field in fields.items() if _tables_in(field.annotation)}
+        remedy = _key_remedy(str(loc[-1]), [*fields], keys_of_tables, model)
         return Complaint(where, value_text(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
@@ -217,8 +218,8 @@ def _head(name: str, model: type[BaseModel]) -> str:
     return f"[[{name}]]" if str(model.model_fields[name].annotation).startswith("list[") else f"[{name}]"
 
 
-def _key_remedy(word: str, keys: Sequence[str], model: type[BaseModel]) -> str:
-    """Return the remedy for a word that is none of the keys of a table.
+def _key_remedy(word: str, keys: Sequence[str], keys_of_tables: Set[str], model: type[BaseModel]) -> str:
+    """Return the remedy for a word that is none of the keys of a table, of which some have tables.
 
     A key that the word means in the trade comes first, then the tables that have such a key, then a similar key.
     """
@@ -227,6 +228,9 @@ def _key_remedy(word: str, keys: Sequence[str], model: type[BaseModel]) -> str:
         return f"did you mean '{stem}', whose unit stands with its number, as in \"120 mm\"?"
     for key, note in sorted(meanings(word), key=lambda meaning: meaning[0] not in keys):
         homes = _homes(key, model)
+        if key in keys and note.startswith("a table ") and key not in keys_of_tables:
+            # here the key is a number, such as the mass of a big end
+            continue
         if not key:
             return note
         if key in keys or (0 < len(homes) <= _MAX_NAMED and key not in model.model_fields):

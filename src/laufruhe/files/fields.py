@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
 
 from pydantic import (
@@ -16,6 +17,7 @@ from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     PlainValidator,
+    TypeAdapter,
     WithJsonSchema,
     create_model,
 )
@@ -233,6 +235,11 @@ class OrWord:
         return inner(raw)
 
 
+@cache
+def _adapter(annotation: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(annotation)
+
+
 @dataclass(frozen=True)
 class ListOrSingle:
     """Pydantic field that reads a list, or a single value as a list of one."""
@@ -248,10 +255,8 @@ class ListOrSingle:
         return {"anyOf": [list_schema["items"], list_schema]}
 
     def _read(self, raw: Any, inner: Callable[[Any], Any]) -> Any:
-        if not isinstance(raw, list) and isinstance(self.inner, type) and issubclass(self.inner, BaseModel):
-            # a complaint about a single table has no index
-            return [self.inner.model_validate(raw)]
-        return inner(raw if isinstance(raw, list) else [raw])
+        # a complaint about a single value has no index
+        return inner(raw) if isinstance(raw, list) else [_adapter(self.inner).validate_python(raw)]
 
 
 def refusal(text: str) -> PydanticCustomError:

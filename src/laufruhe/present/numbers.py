@@ -73,11 +73,12 @@ _WORKSHOP = {"kg": ("g", 1e3), "kg m": ("g mm", 1e6)}
 def in_grams(value: float, unit: str, scale: float) -> str:
     """Return a mass or an unbalance once more in workshop units, as " = 12 g" or " = 30 g mm".
 
-    The text is empty for other units, for values that are zero by rounding of `scale`, and if the user chose a unit.
+    The text is empty for other units, for values that are zero by rounding of `scale`, from a million on, and if the
+    user chose a unit.
     """
-    if unit not in _WORKSHOP or is_shown(unit) or abs(value) <= ROUNDS_TO_ZERO * scale:
+    name, factor = _WORKSHOP.get(unit, ("", 0.0))
+    if not name or is_shown(unit) or not ROUNDS_TO_ZERO * scale < abs(value) < 1e6 / factor:
         return ""
-    name, factor = _WORKSHOP[unit]
     return f" = {number(value * factor)} {name}"
 
 

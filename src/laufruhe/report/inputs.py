@@ -20,7 +20,7 @@ from laufruhe.physics.rigid_body import turns_of
 from laufruhe.present.numbers import DASH, DEGREE, fixed, trimmed, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.problem.problem import Problem
-from laufruhe.units import readable
+from laufruhe.units import readable, readable_unbalance
 
 NOTE = (
     "Throws at a crank angle of 0 (C5), which is the firing dead centre of the cylinder that fires at 0. The offset is "
@@ -32,14 +32,15 @@ OF_ROTORS = "The unbalance of a throw is its rotating mass times the crank radiu
 
 def input_tables(problem: Problem, engine: Engine) -> list[Table]:
     """Return tables of the engine of a result: what it is, and the numbers of its cylinders and rotating parts."""
-    length, mass, unbalance = readable("m")[0], readable("kg")[0], readable("kg m", "g mm")[0]
+    length, mass, all_rotors = readable("m")[0], readable("kg")[0], (*engine.pins, *engine.rotors)
+    unbalance, factor = readable_unbalance(max((abs(rotor.unbalance) for rotor in all_rotors), default=0.0))
     x, y, z = (f"{axis} [{length}]" for axis in "xyz")
     sizes = (f"{name} [{length}]" for name in ("bore", "stroke", "rod", "offset"))
     of_cylinder = ("", x, "bank [deg]", "throw [deg]", "fires at [deg]", *sizes, f"reciprocating mass [{mass}]")
     of_rotor = ("", "shaft", "ratio", x, y, z, f"unbalance [{unbalance}]", "angle [deg]")
     of_mount = ("mount", x, y, z, "stiffness along its axes", "its axes turned [deg]")
     cylinders = [_cylinder(part) for part in engine.slider_cranks]
-    rotors = [_rotor(rotor) for rotor in (*engine.pins, *engine.rotors)]
+    rotors = [_rotor(rotor, factor) for rotor in all_rotors]
     tables = [Table(("input", "value"), list(_engine_rows(problem, engine)), left=2)]
     tables += [Table(of_cylinder, cylinders, note=NOTE)]
     tables += [Table(of_rotor, rotors, left=2, note=OF_ROTORS)] if rotors else []
@@ -84,9 +85,9 @@ def _cylinder(part: SliderCrank) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _rotor(rotor: Rotor) -> tuple[str, ...]:
+def _rotor(rotor: Rotor, factor: float) -> tuple[str, ...]:
     size, angle = abs(rotor.unbalance), cmath.phase(rotor.unbalance)
-    factor, millimetres = readable("kg m", "g mm")[1], readable("m")[1]
+    millimetres = readable("m")[1]
     place = (trimmed(millimetres * length) for length in (rotor.x, rotor.shaft.y, rotor.shaft.z))
     turn = trimmed(DEGREE * (angle % math.tau)) if size else DASH
     return rotor.name, rotor.shaft.name, trimmed(rotor.shaft.ratio), *place, trimmed(factor * size, 5), turn

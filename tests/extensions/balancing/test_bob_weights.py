@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.extensions.balancing.bob_weights import SECTION, BobWeights, card
+from laufruhe.extensions.balancing.file import load_job
 from laufruhe.files.reader import load
 from laufruhe.machine import Engine
 from laufruhe.solvers import evaluate_only, solve
@@ -143,7 +146,10 @@ def test_results_have_the_card() -> None:
         ("balance_factor = 0.5", "bob_weights.big_end: is missing"),
         (END.replace('"1 kg"', '["1 kg", "1 kg"]'), "big_end: has 2 entries for 4 rods"),
         (f'{END}piston = "1 kg"', "bob_weights.small_end: is missing, and piston is given"),
-        (END.replace('"1 kg"', '{ between = ["1 kg", "2 kg"] }'), "bob_weights.big_end"),
+        (END.replace('"1 kg"', '{ between = ["1 kg", "2 kg"] }'), "bob_weights.big_end = "),
+        (f"{END}piston = 380", "bob_weights.piston = 380: has no unit"),
+        (f'{END}piston = ["1 kg", 380]', "bob_weights.piston[2] = 380: has no unit"),
+        (f'{END}crank_pin = "400 g"', "is not a key here; use one of: balance_factor, bearing_shells, big_end"),
     ],
 )
 def test_wrong_tables_are_refused(table: str, said: str) -> None:
@@ -151,3 +157,18 @@ def test_wrong_tables_are_refused(table: str, said: str) -> None:
         weights_of(FOUR, table)
     assert said in str(caught.value)
     assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(("mass", "bob", "is_said"), [('"1 kg"', 1.5, True), ('["1 kg", "1 kg"]', 3.0, False)])
+def test_a_card_without_an_engine_says_that_one_rod_is_on_the_pin(
+    tmp_path: Path, mass: str, bob: float, is_said: bool
+) -> None:
+    file = tmp_path / "twin.toml"
+    file.write_text(
+        'title = "twin"\n[bob_weights]\nbalance_factor = 0.5\nbig_end = "1 kg"\n'
+        f'piston = "0.5 kg"\nsmall_end = {mass.replace("1 kg", "0.5 kg")}\n', encoding="utf-8",
+    )  # fmt: skip
+    weights = load_job(file).weights
+    assert weights is not None
+    assert weights.mass(None, 0) == pytest.approx(bob)
+    assert ("for two rods write" in card(None, weights).note) is is_said

@@ -234,6 +234,18 @@ def test_report_and_record() -> None:
     assert record["towards_crank"]["value"] == pytest.approx(result["piston acceleration"], rel=1e-12)
 
 
+def test_the_table_has_no_column_without_a_value() -> None:
+    """The side force of a rhombic drive is not computed."""
+    heads = {name: SECTION.tables(laufruhe.evaluate(name))[0] for name in ("rhombic-stirling", "single-piston-slap")}
+    slap, rhombic = heads["single-piston-slap"], heads["rhombic-stirling"]
+    assert "reversals" in slap.head
+    assert "Reversals" in slap.note
+    assert rhombic.head == slap.head[: len(rhombic.head)]
+    assert "reversals" not in rhombic.head
+    assert "Reversals" not in rhombic.note
+    assert all(len(row) == len(rhombic.head) for row in rhombic.rows)
+
+
 def test_speed_scales_the_motion() -> None:
     part = replace(slider_crank(0.3), offset=0.004)
     slow, fast = piston_motion(part, 100.0), piston_motion(part, 300.0)

@@ -13,7 +13,7 @@ from laufruhe.present.numbers import aligned, number, share
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
+from laufruhe.units import readable, readable_unbalance
 
 ROTATING = ("big_end", "bearing_shells")
 RECIPROCATING = ("piston", "pin", "rings", "locks", "small_end")
@@ -80,7 +80,7 @@ def card(engine: Engine | None, weights: BobWeights) -> Table:
         names, throws, radii = [f"each of {counted(len(throws), 'crank pin')}"], throws[:1], radii[:1]
     columns = {name: [shares[name] for shares in throws] for name in throws[0]}
     totals = [weights.mass(engine, k) for k in range(len(throws))]
-    (unit, grams), (unbalance, size) = readable("kg", "g"), readable("kg m", "g mm")
+    unit, grams = readable("kg", "g")
     largest = grams * max(totals)
     rows = [
         [name.replace("_", " "), share(cells[0][1]), *(aligned(grams * m * part, largest) for m, part in cells)]
@@ -92,8 +92,12 @@ def card(engine: Engine | None, weights: BobWeights) -> Table:
         "On a crank pin, all rods of the pin counted: rotating masses and oil in full, reciprocating masses with "
         "the balance factor."
     )
+    if engine is None and len(weights.throws[0]) == 1:
+        note += " One rod is on the pin; for two rods write a mass m of each as [m, m]."
     if engine:
-        cells = [number(size * m * r, 5) for m, r in zip(totals, radii, strict=True)]
+        unbalances = [m * r for m, r in zip(totals, radii, strict=True)]
+        unbalance, size = readable_unbalance(max(unbalances))
+        cells = [number(size * one, 5) for one in unbalances]
         rows.append([f"unbalance [{unbalance}]", "", *cells])
         note += f" The unbalance is that at the crank radius.{_difference(engine, weights)}"
     return Table((f"part [{unit}]", "share", *names), rows, title="Bob weights", note=note, file=CARD)

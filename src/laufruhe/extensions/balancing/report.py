@@ -28,7 +28,7 @@ from laufruhe.report.screen import show_document
 from laufruhe.report.strict_json import strict, versions
 from laufruhe.report.table_files import write_csv
 from laufruhe.report.web_page import write_pages
-from laufruhe.units import readable, shown_in
+from laufruhe.units import readable, readable_unbalance, shown_in
 
 HOLES, PICTURE = "holes", "planes"
 NAMES = (
@@ -165,7 +165,7 @@ def _proof(answer: Balanced) -> str:
 
 def _hole_table(answer: Balanced) -> Table:
     drilling, dial = answer.correction.drilling, answer.correction.dial
-    (length, millimetres), (mass, grams), (unbalance, size) = _units()
+    (length, millimetres), (mass, grams), (unbalance, size) = _units(answer.planes)
     rows = [
         (f"{k}", plane.name, _kind(hole), *(trimmed(millimetres * size) for size in (hole.diameter, hole.depth)),
          number(millimetres * drilling.tip(hole.diameter, hole.depth)), trimmed(millimetres * plane.radius),
@@ -190,15 +190,16 @@ def _hole_table(answer: Balanced) -> Table:
 
 
 def _wall(answer: Balanced) -> str:
-    (length, factor), wall = _units()[0], max(plane.wall for plane in answer.correction.planes)
+    (length, factor), wall = _units(answer.planes)[0], max(plane.wall for plane in answer.correction.planes)
     if not wall:
         return "The file gives no wall: a drill may break through into the next hole, or at the edge of a sector."
     return f"At least {trimmed(factor * wall)} {length} of material is left between holes, and at the edge of a sector."
 
 
-def _units() -> tuple[tuple[str, float], ...]:
+def _units(planes: Sequence[PlaneResult]) -> tuple[tuple[str, float], ...]:
     # units of lengths, masses and unbalances in the report, with factors on SI values
-    return readable("m"), readable("kg", "g"), readable("kg m", "g mm")
+    largest = max(abs(result.plane.initial) for result in planes)
+    return readable("m"), readable("kg", "g"), readable_unbalance(largest)
 
 
 def _signed(value: float) -> str:
@@ -240,7 +241,7 @@ def _hole_records(answer: Balanced) -> list[dict[str, Any]]:
 
 
 def _plane_table(answer: Balanced) -> Table:
-    dial, (unit, size) = answer.correction.dial, _units()[2]
+    dial, (unit, size) = answer.correction.dial, _units(answer.planes)[2]
     rows = [
         (result.plane.name, number(size * abs(result.plane.initial)), _angle(result.plane.initial, dial.reading),
          f"{len(result.design)}", number(size * abs(result.residual), 3), _angle(result.residual, dial.reading),
@@ -260,7 +261,7 @@ def _angle(unbalance: complex, reading: Callable[[float], float]) -> str:
 
 
 def _count_table(answer: Balanced) -> Table:
-    numbers, (unit, size) = max(len(result.counts) for result in answer.planes), _units()[2]
+    numbers, (unit, size) = max(len(result.counts) for result in answer.planes), _units(answer.planes)[2]
     rows = [
         (f"{holes}", *(cell for result in answer.planes for cell in _count_cells(result, holes, size)))
         for holes in range(numbers)
@@ -350,7 +351,7 @@ def _panel(
         marks += _hole_marks(angle, hole, radius, correction.drilling)
         place = (radius + 0.5e3 * hole.diameter + 0.05 * reach) * _unit(np.array([angle]))[0]
         marks.append(Words(place[0], place[1], f"{k}", across="center"))
-    (length, millimetres), _, (unbalance, size) = _units()
+    (length, millimetres), _, (unbalance, size) = _units([result])
     texts = [
         f"{k}: ⌀{trimmed(millimetres * hole.diameter)} × {trimmed(millimetres * hole.depth)} {length} at "
         f"{fixed(math.degrees(correction.dial.reading(angle)), 1)}°"

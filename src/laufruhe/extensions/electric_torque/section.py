@@ -10,7 +10,7 @@ import numpy as np
 
 from laufruhe.extensions.electric_torque.channels import ELECTRIC_TORQUE
 from laufruhe.extensions.electric_torque.machine import ElectricMachines, machines_of
-from laufruhe.present.numbers import figure, number
+from laufruhe.present.numbers import figure, number, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.report.section import Section
@@ -92,10 +92,10 @@ def _limit_words(result: Result) -> Iterator[str]:
     for one in machines_of(result.final.engine):
         constant, points = one.torque_constant or math.nan, ["", *(f" at {p.name}" for p in result.problem.points)]
         if (torque := limits.get(f"{one.name}.max_current")) is not None:
-            yield f"{one.name}.max_current of {figure(torque / constant, 'A')} is {figure(torque, 'N m')}"
+            yield f"{one.name}.max_current of {with_unit(torque / constant, 'A')} is {with_unit(torque, 'N m')}"
         for torque in [limits[name] for place in points if (name := f"{one.name}.max_loss{place}") in limits][:1]:
             loss = (one.resistance or math.nan) * (torque / constant) ** 2
-            yield f"{one.name}.max_loss of {figure(loss, 'W')} is {figure(torque, 'N m')} rms"
+            yield f"{one.name}.max_loss of {with_unit(loss, 'W')} is {with_unit(torque, 'N m')} rms"
 
 
 SECTION = Section("electric_machines", has_machines, _tables, _record, ("electric-machines",))

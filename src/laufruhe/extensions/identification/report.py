@@ -27,7 +27,7 @@ from laufruhe.report.screen import show_document
 from laufruhe.report.strict_json import strict, versions
 from laufruhe.report.table_files import write_csv
 from laufruhe.report.web_page import write_pages
-from laufruhe.units import readable, shown_in
+from laufruhe.units import readable, readable_unbalance, shown_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -205,7 +205,8 @@ def _table(answer: Estimate, *, is_readable: bool) -> Table:
     """Return the estimates, in readable or in SI units."""
     rows = []
     for name, si_unit, value, deviation, status in _lines(answer):
-        unit, factor = readable(si_unit, "g mm" if si_unit == "kg m" else "") if is_readable else (si_unit, 1.0)
+        of_unit = readable_unbalance(abs(value)) if si_unit == "kg m" else readable(si_unit)
+        unit, factor = of_unit if is_readable else (si_unit, 1.0)
         half = answer.half_width * deviation
         ends = (None, None) if status else (factor * (value - half), factor * (value + half))
         cells = (None if status == "not determined" else factor * value, *ends)

@@ -64,11 +64,18 @@ def _tables(result: Result) -> list[Table]:
         "from crank": "m/s^2", "rod angle": "rad", "reversals": "", "fastest reversal": "N/s",
     }  # fmt: skip
     head = ("at", "cylinder", *(f"{word} [{readable(unit)[0]}]" if unit else word for word, unit in units.items()))
+    # leave out columns without a value, such as the rod angle of a yoke
+    columns = [(name, *column) for name, *column in zip(head, *texts, strict=True) if any(column)]
+    head, *texts = zip(*columns, strict=True)
     note = (
-        "Final design, at the mean speed of the crank. Angles behind 'at' [deg]: own crank after top dead centre. "
-        "Reversals: how often the side force changes its sign in a cycle, and its rate at the fastest reversal, a "
-        "measure of piston slap."
+        "Final design, at the mean speed of the crank. Angles behind 'at' [deg]: own crank after top dead centre, "
+        "which an offset turns away from the cylinder axis."
     )
+    if any(name == "reversals" for name in head):
+        note += (
+            " Reversals: how often the side force changes its sign in a cycle, and its rate at the fastest reversal, "
+            "a measure of piston slap."
+        )
     return [Table(head, texts, title="Motion of the pistons", left=2, note=note, file="piston-motion")]
 
 

@@ -14,7 +14,7 @@ from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.report.sections.weights import sense_of
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
+from laufruhe.units import readable, readable_unbalance
 
 _SIZES = ("inner_radius", "outer_radius", "angle", "width", "tail", "fillet")
 _SIZE_NOTE = "Open sizes are those of the least mass with this unbalance."
@@ -37,9 +37,8 @@ def _tables(result: Result) -> list[Table]:
 
 
 def _bodies(weights: Sequence[Weight]) -> list[Table]:
-    (length, millimetres), (mass, grams), (unbalance, factor) = (
-        readable("m"), readable("kg", "g"), readable("kg m", "g mm")
-    )  # fmt: skip
+    (length, millimetres), (mass, grams) = readable("m"), readable("kg", "g")
+    unbalance, factor = readable_unbalance(max(weight.body.unbalance for weight in weights))
     keys = [key for key in _SIZES if any(weight.body.shape.sizes.get(key) for weight in weights)]
     sizes, masses = list[Sequence[str]](), list[Sequence[str]]()
     for weight in weights:

@@ -21,6 +21,7 @@ from laufruhe.extensions.workshop.shapes import Across, Along, Opening, Round
 from laufruhe.machine import Engine
 from laufruhe.plots.words import fit_line
 from laufruhe.present.numbers import number, trimmed
+from laufruhe.units import readable_unbalance
 
 SCALES = (10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 """Scales of ISO 5455."""
@@ -252,10 +253,11 @@ def _block(weight: Weight, title: str, scale: float, corner: complex) -> tuple[l
     count = 2 if body.spacing else 1
     single = f"{number(_MM * body.mass / count)} g"
     mass = f"2 × {single} = {number(_MM * body.mass)} g" if count > 1 else single
+    unbalance, factor = readable_unbalance(body.unbalance)
     rows = (
         ((0.0, "part", weight.rotor.name), (70.0, "engine", title)),
         ((0.0, "body", f"{body.shape.name}, {count} off"), (70.0, "mass", mass),
-         (150.0, "unbalance" + (" of both" if count > 1 else ""), f"{number(1e6 * body.unbalance)} g mm")),
+         (150.0, "unbalance" + (" of both" if count > 1 else ""), f"{number(factor * body.unbalance)} {unbalance}")),
         ((0.0, "density of the material", f"{trimmed(body.density)} kg/m³"),
          (70.0, "inertia about the shaft", f"{number(1e6 * body.inertia)} kg mm²"),
          (150.0, "scale", scale_text(scale)), (185.0, "dimensions in", "mm and °")),

@@ -1,4 +1,4 @@
-"""Tables of counterweights and balancer weights in g, g mm and degrees, of their shafts, and of balance factors."""
+"""Tables of counterweights and balancer weights, of their shafts, and of balance factors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import DASH, fixed, number, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
+from laufruhe.units import readable, readable_unbalance
 
 NEXT_TO_NOTHING = 1e-9
 _ANGLES = "Angles at a crank angle of 0, clockwise from the top, seen from the front (C4)."
@@ -24,14 +24,14 @@ _FACTOR = (
 
 def weights(result: Result) -> list[Table]:
     """Return a table of the counterweights and balancers of the final design, a row for each."""
-    (length, millimetres), (unbalance, size), (mass_unit, grams) = (
-        readable("m"), readable("kg m", "g mm"), readable("kg", "g")
-    )  # fmt: skip
+    (length, millimetres), (mass_unit, grams) = readable("m"), readable("kg", "g")
     before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
     rotors = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
     scale, two, rows = max((abs(rotor.unbalance) for rotor in rotors), default=0.0), is_changed(result), []
-    for rotor in rotors:
-        initial = before.get(rotor.name, rotor)
+    pairs = [(before.get(rotor.name, rotor), rotor) for rotor in rotors]
+    unbalance, size = readable_unbalance(max((abs(rotor.unbalance) for pair in pairs for rotor in pair), default=0.0))
+    has_si = unbalance != "kg m"
+    for initial, rotor in pairs:
         if max(abs(rotor.unbalance), abs(initial.unbalance)) <= NEXT_TO_NOTHING * scale:
             continue
         mass, radius = DASH, DASH
@@ -40,10 +40,10 @@ def weights(result: Result) -> list[Table]:
             radius = trimmed(millimetres * rotor.radius)
         lead = _size_and_angle(initial, scale, size) if two else ()
         rows.append((rotor.name, trimmed(millimetres * rotor.x), *lead, *_size_and_angle(rotor, scale, size),
-                     number(abs(rotor.unbalance), scale=scale), mass, radius))  # fmt: skip
+                     *[number(abs(rotor.unbalance), scale=scale)] * has_si, mass, radius))  # fmt: skip
     sides = ("initial ", "final ") if two else ("",)
     sizes = [f"{side}{what} [{unit}]" for side in sides for what, unit in (("unbalance", unbalance), ("angle", "deg"))]
-    head = ("weight", f"x [{length}]", *sizes, f"{sides[-1]}unbalance [kg m]", f"mass [{mass_unit}]",
+    head = ("weight", f"x [{length}]", *sizes, *[f"{sides[-1]}unbalance [kg m]"] * has_si, f"mass [{mass_unit}]",
             f"at radius [{length}]")  # fmt: skip
     title = "Weights" + (" of the final design" if two else "")
     return [Table(head, rows, title=title, note=_ANGLES, file="weights")]
