@@ -172,7 +172,7 @@ def object_at(address: str) -> Any:
     """Return an object by its address `module:name`; raise `ModelError` if its extension is not installed."""
     module, _, name = address.partition(":")
     if module.startswith(GROUP) and find_spec(home := ".".join(module.split(".")[:3])) is None:
-        raise ModelError(f"laufruhe.{name} {'; '.join(missing_extension(home.rpartition('.')[2]))}")
+        raise ModelError(f"{name} {'; '.join(missing_extension(home.rpartition('.')[2]))}")
     return getattr(import_module(module), name)
 
 

@@ -218,8 +218,8 @@ _CORE: tuple[Method, ...] = (
     Method(
         "local programs of all numbers", dict.fromkeys(KINDS.values(), _ANY), ProofStrength.RELAXED, solve_all_numbers,
         accepts_norm=lambda _: True,
-        proves="a local optimum by exact evaluations, with the bound of a row above that accepts all open numbers and "
-        "a term; of 60 stars at most, each by its own method",
+        proves="a local optimum by exact evaluations; a row above that accepts all open numbers and a part of the "
+        "objective gives its bound (P18), else it has none; at most 60 stars, each by its own method",
     ),
 )  # fmt: skip
 

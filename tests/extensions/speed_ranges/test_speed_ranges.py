@@ -316,6 +316,12 @@ def test_a_wrong_range_is_refused_in_one_line(more: str, tmp_path: Path) -> None
     assert complaint.remedy
 
 
+def test_a_worst_value_needs_its_norm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("laufruhe.extensions.speed_ranges.file.extensions", lambda: ())
+    with pytest.raises(InputError, match="minimise: needs the extension 'worst_mean'"):
+        laufruhe.load(written(tmp_path, "minimise = true\n"))
+
+
 def test_an_undamped_resonance_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path)
     text = path.read_text(encoding="utf-8")
