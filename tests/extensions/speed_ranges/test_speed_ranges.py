@@ -329,3 +329,14 @@ def test_an_undamped_resonance_is_refused(tmp_path: Path) -> None:
     path.write_text(text.replace(line, "loss_factor = 0"), encoding="utf-8")
     with pytest.raises(ModelError, match=r"crosses a resonance|undamped|driven at"):
         laufruhe.solve(laufruhe.load(path))
+
+
+def test_a_limited_range_has_the_peak_of_its_value_too(tmp_path: Path) -> None:
+    """A steep limit is tightest far from the largest value, whose peak is found between samples all the same."""
+    _, free = found(written(tmp_path, seed=2))
+    worst = float(free.values[free.worst])
+    steep = f'max = [["1500 rpm", "{9e3 * worst} mm/s^2"], ["7000 rpm", "{10.0 * worst} mm/s^2"]]\n'
+    _, limited = found(written(tmp_path, steep, seed=2))
+    assert limited.tightest != limited.worst == limited.tops[0]
+    assert limited.values[limited.worst] == pytest.approx(worst, rel=1e-9)
+    assert limited.tightest in limited.tops[:2]

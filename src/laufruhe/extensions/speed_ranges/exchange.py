@@ -137,7 +137,7 @@ def _sorted(speeds: Mapping[str, set[float]]) -> Speeds:
 
 
 def _tops(one: Response) -> list[float]:
-    return [float(one.speeds[k]) for k in (*one.tops[:TOPS], one.worst, one.tightest)]
+    return one.speeds[one.tops[:TOPS]].tolist()
 
 
 def _violated_speeds(one: Response, result: Result) -> list[float]:
@@ -146,7 +146,7 @@ def _violated_speeds(one: Response, result: Result) -> list[float]:
     if one.span.minimised and result.objective is not None:
         zero_level = numerical_zero(result.problem, result.final.engine)
         over |= one.values > result.objective.value * (1.0 + TIGHT * result.problem.tolerance) + zero_level
-    return [float(one.speeds[k]) for k in dict.fromkeys((*one.tops[:TOPS], one.worst, one.tightest)) if over[k]]
+    return [float(one.speeds[k]) for k in one.tops[:TOPS] if over[k]]
 
 
 def _conclusion(
@@ -154,7 +154,7 @@ def _conclusion(
 ) -> Result:
     """Return a result at the peaks of its design and of the initial one, with a lower bound [SI]."""
     pairs = list(zip(details.initial, details.final, strict=True))
-    speeds = {one.span.name: {*_tops(one)[:PEAKS_IN_TABLES], *_tops(before)[-2:]} for before, one in pairs}
+    speeds = {one.span.name: {*_tops(one)[:PEAKS_IN_TABLES], *_tops(before)[:2]} for before, one in pairs}
     priced = {
         at for (limit, _), price in result.prices.items() if price.relaxed > 0.0 for at in limit.measure.points or ()
     }

@@ -1,14 +1,15 @@
 """Response of a design over a speed range, with its peaks found between samples (P23).
 
 Samples stand at equal ratios of speed, at the kinks of limit and time shares, and wherever an order that counts meets
-a natural frequency or another critical frequency of the engine. Each sample that is higher than its neighbours, and
-high enough to hold the largest value between them, is the middle of a bracket, in which Brent's method finds the peak.
+a natural frequency or another critical frequency of the engine. Each sample whose value or share of the limit is higher
+than at its neighbours, and high enough to hold the largest one between them, is the middle of a bracket, in which
+Brent's method finds the peak.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -40,7 +41,7 @@ class Response:
     speeds, values, limits
         Crank speeds in ascending order [rad/s], values and limits there [SI], shape (n,).
     tops
-        Indices of the peaks, those with the largest share of the limit first, or of the largest value without a limit.
+        Indices of the largest value, then of the peaks of value and share of the limit, the highest of either first.
     """
 
     def __init__(self, problem: Problem, evaluation: Evaluation, span: SpeedRange) -> None:
@@ -49,18 +50,22 @@ class Response:
         samples = self._samples()
         known: dict[float, float] = dict(zip(samples.tolist(), self._values(samples.tolist()), strict=True))
 
-        def share(speed: float) -> float:
+        def value(speed: float) -> float:
             if speed not in known:
                 (known[speed],) = self._values([speed])
-            return known[speed] / (1.0 if span.limit is None else float(np.interp(speed, *span.limit)))
+            return known[speed]
 
-        shares = np.array([share(speed) for speed in samples.tolist()])
-        padded = np.concatenate([[-math.inf], shares, [-math.inf]])
-        is_top = (shares >= padded[:-2]) & (shares >= padded[2:]) & (shares >= NEAR * shares.max())
-        peaks = {_peak(share, samples, k) for k in np.flatnonzero(is_top).tolist()}
+        def share(speed: float) -> float:
+            return value(speed) / float(span.limits_at(np.array(speed)))
+
+        peaks = set(_peaks(value, samples))
+        if span.limit is not None:
+            peaks.update(_peaks(share, samples))
         self.speeds, self.values = (np.array(column) for column in zip(*sorted(known.items()), strict=True))
         self.limits = span.limits_at(self.speeds)
-        self.tops = [int(np.searchsorted(self.speeds, speed)) for speed in sorted(peaks, key=share, reverse=True)]
+        heights = np.maximum(self.values / (self.values.max() or 1.0), self.values / self.limits / (self.ratio or 1.0))
+        places = np.searchsorted(self.speeds, list(peaks)).tolist()
+        self.tops = list(dict.fromkeys((self.worst, *sorted(places, key=heights.__getitem__, reverse=True))))
 
     def _samples(self) -> Array:
         low, high, curves = self.span.low, self.span.high, (self.span.limit, self.span.shares)
@@ -151,11 +156,15 @@ class RangeResponses(ResultDetails):
     rounds: int
 
 
-def _peak(share: Callable[[float], float], samples: Array, k: int) -> float:
-    # speed of the largest value between the neighbours of sample k [rad/s]
+def _peaks(height: Callable[[float], float], samples: Array) -> Iterator[float]:
+    """Yield the speeds of the peaks that may be the highest, each between the neighbours of a sample [rad/s]."""
     from scipy.optimize import minimize_scalar
 
-    low, high = float(samples[max(k - 1, 0)]), float(samples[min(k + 1, len(samples) - 1)])
-    peak = minimize_scalar(lambda s: -share(float(s)), bounds=(low, high), method="bounded",
-                            options={"xatol": BRACKET * high})  # fmt: skip
-    return max((float(samples[k]), float(peak.x)), key=share)
+    heights = np.array([height(speed) for speed in samples.tolist()])
+    padded = np.concatenate([[-math.inf], heights, [-math.inf]])
+    is_top = (heights >= padded[:-2]) & (heights >= padded[2:]) & (heights >= NEAR * heights.max())
+    for k in np.flatnonzero(is_top).tolist():
+        low, high = float(samples[max(k - 1, 0)]), float(samples[min(k + 1, len(samples) - 1)])
+        peak = minimize_scalar(lambda s: -height(float(s)), bounds=(low, high), method="bounded",
+                                options={"xatol": BRACKET * high})  # fmt: skip
+        yield max((float(samples[k]), float(peak.x)), key=height)
