@@ -185,7 +185,7 @@ def _conclusion(
     if certificate is not None and certificate.kind is not Proof.NONE:
         certificate = make_certificate(
             value, bound, zero_level, problem.tolerance, _STRENGTHS[certificate.kind], certificate.kkt_residual,
-            f"{certificate.method}; exchange of speeds, {details.rounds} rounds", value_error,
+            f"{certificate.method}; exchange of speeds, {details.rounds} rounds, peaks by search", value_error,
         )  # fmt: skip
         status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return replace(
