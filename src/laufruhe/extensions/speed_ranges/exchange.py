@@ -110,7 +110,7 @@ def evaluate_ranges(problem: Problem, result: Result) -> Result:
     _refuse_ranges(problem)
     ranges, base = _ranges_of(problem), problem.changed(extras=(), origin=problem.origin)
     responses = tuple(Response(base, result.initial, span) for span in ranges)
-    peaks = _sorted({one.span.name: {*_tops(one)[:PEAKS_IN_TABLES], *_tops(one)[-2:]} for one in responses})
+    peaks = _sorted({one.span.name: set(_tops(one)[:PEAKS_IN_TABLES]) for one in responses})
     at_peaks = at_speeds(base, ranges, peaks)
     design = evaluate(at_peaks)
     return replace(
@@ -137,7 +137,7 @@ def _sorted(speeds: Mapping[str, set[float]]) -> Speeds:
 
 
 def _tops(one: Response) -> list[float]:
-    return one.speeds[one.tops[:TOPS]].tolist()
+    return [float(one.speeds[k]) for k in one.tops[:TOPS]]
 
 
 def _violated_speeds(one: Response, result: Result) -> list[float]:
