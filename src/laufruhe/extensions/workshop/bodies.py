@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.workshop.shapes import Shape
+from laufruhe.units import readable_unbalance
 
 SHORT = 1e-6
 """Accuracy of a radius that a clearance limits [m]."""
@@ -189,8 +190,9 @@ class BodyFit:
         low, high = self.bounds
         slack = _ROUNDING * high
         if not low - slack <= unbalance <= high + slack:
-            rule = f"an unbalance of {1e6 * unbalance:.5g} g mm"
-            raise ModelError(f"{rule} is outside the range of the body, {1e6 * low:.5g} to {1e6 * high:.5g} g mm")
+            unit, factor = readable_unbalance(max(unbalance, high))
+            rule = f"an unbalance of {factor * unbalance:.5g} {unit} is outside the range of the body"
+            raise ModelError(f"{rule}, {factor * low:.5g} to {factor * high:.5g} {unit}")
         small, large = self.sizes.smallest, self.sizes.largest
         thin, thick = replace(small, shape=self.narrow), replace(large, shape=self.narrow)
         if unbalance <= low:
