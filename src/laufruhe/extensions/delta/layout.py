@@ -79,9 +79,16 @@ class Delta(LayoutKind):
     keys = (
         SPACING,
         CRANK_DISTANCE,
-        LayoutKey("reversed_crank", "cylinder", "Crank of a triangle against the other two: 1 below, 2 left, 3 right."),
         LayoutKey(
-            "crank_leads", "angles", "Angles by which the first pistons of the first two banks of a triangle lead."
+            "reversed_crank",
+            "cylinder",
+            "Crank of a triangle against the other two: 1 below, 2 left, 3 right; none by default.",
+        ),
+        LayoutKey(
+            "crank_leads",
+            "angles",
+            "Angles by which the first pistons of the first two banks of a triangle lead; by default the least lead "
+            "that all banks may share.",
         ),
     )
     lists = ("throws", "firing_order")

@@ -53,7 +53,7 @@ class SectionTable(Table):
     )
     bore: f.NonNegativeLength = 0.0
     damping: TorsionalDamping = 0.0
-    loss_factor: f.LossFactor | None = None
+    loss_factor: f.LossFactor | None = f.optional("Hysteretic loss factor; by default that of [torsion].")
 
 
 class TorsionShaftTable(SectionTable):

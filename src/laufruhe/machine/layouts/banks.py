@@ -113,7 +113,7 @@ class Vee(LayoutKind):
     keys = (
         SPACING,
         LayoutKey("bank_angle", "open angle", "Angle between the banks of a vee."),
-        LayoutKey("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads."),
+        LayoutKey("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads; 0 by default."),
         STAGGER,
         ROW_ANGLE,
         *NUMBERING,

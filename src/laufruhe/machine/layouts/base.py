@@ -54,7 +54,7 @@ ROW_ANGLE = LayoutKey(
     "row_angle",
     "angle",
     "Angle between the two rows of a bank whose cylinders lean alternately to the left and right (VR and W engines); "
-    "negative if the front cylinder leans to the right.",
+    "negative if the front cylinder leans to the right. By default a bank has one row.",
 )
 FIRST_END = LayoutKey("first_end", "end", "End of the engine at which cylinder 1 stands; the front by default.")
 FIRST_BANK = LayoutKey(
