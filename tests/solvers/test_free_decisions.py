@@ -191,6 +191,10 @@ def test_a_large_residual_of_the_conditions_is_no_percentage() -> None:
     local = replace(loose, certificate=replace(loose.certificate, kind=Proof.LOCAL, lower_bound=0.0, gap=1.0))
     assert "conditions are not confirmed" in explained(local)
     assert "%" not in explained(local)
+    unproven = replace(local, certificate=replace(local.certificate, kind=Proof.NONE))
+    assert explained(unproven) == "No useful lower bound was found."
+    bounded = replace(unproven, certificate=replace(unproven.certificate, lower_bound=1.0, gap=0.5))
+    assert explained(bounded).startswith("No design is below 1.00000 N; designs between this bound and this design")
 
 
 def test_a_free_angle_runs_from_the_first_to_the_last_of_its_designs() -> None:

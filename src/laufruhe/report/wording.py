@@ -217,15 +217,15 @@ def explained(result: Result) -> str:
         bound = figure(c.lower_bound, o.unit, 6)
         minimum = f"No design within the bounds and limits has less than {bound}. " if c.is_useful else ""
         return f"{minimum}The design found breaks a limit, so it has no proof."
+    between = "designs between this bound and this design are not ruled out"
+    bound = f"no design is below {figure(c.lower_bound, o.unit, 6)}; {between}" if c.is_useful else NO_BOUND
     if c.kind is Proof.NONE:
-        return f"{result.message[:1].upper()}{result.message[1:]}."
+        text = result.message or bound
+        return f"{text[:1].upper()}{text[1:]}."
     if c.kind is Proof.LOCAL or not c.is_useful:
-        bound = (
-            f"No design is below {figure(c.lower_bound, o.unit, 6)}; designs between the two values are not ruled out."
-        )
         return (
             f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "
-            f"At this design {_conditions(c.kkt_residual)}. {bound if c.is_useful else NO_BOUND.capitalize() + '.'}"
+            f"At this design {_conditions(c.kkt_residual)}. {bound[:1].upper()}{bound[1:]}."
         )
     gap = f"a gap of {share(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
     # a large residual, as of a length at zero, says nothing beside a proof
