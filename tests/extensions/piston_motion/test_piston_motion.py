@@ -230,6 +230,8 @@ def test_report_and_record() -> None:
     ]
     (table,) = SECTION.tables(result)
     assert table.rows[0][:3] == ("3000 rpm", "1", "80.00")
+    shown = float(table.rows[0][-1].split(" at ")[0])
+    assert shown == pytest.approx(1e-3 * result.objective.value, rel=1e-3)
     assert record["stroke"] == pytest.approx(0.08, rel=1e-12)
     assert record["towards_crank"]["value"] == pytest.approx(result["piston acceleration"], rel=1e-12)
 

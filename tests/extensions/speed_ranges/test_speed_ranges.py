@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.speed_ranges.exchange import solve_ranges
 from laufruhe.extensions.speed_ranges.peaks import Response
 from laufruhe.extensions.speed_ranges.picture import figure
 from laufruhe.extensions.speed_ranges.ranges import SpeedRanges
@@ -23,6 +24,7 @@ from laufruhe.numerics.norms import RMS, Grid
 from laufruhe.present.measures import is_met
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.solvers import Result
 
 RPM = 30.0 / math.pi
 ENGINE = """
@@ -229,6 +231,7 @@ def test_a_curve_holds_at_every_speed(tmp_path: Path) -> None:
     assert (values / limits).max() == pytest.approx(1.0, abs=2e-5)
     ratio = result.details.final[0].ratio  # type: ignore[union-attr]
     assert ratio == pytest.approx((values / limits).max(), rel=1e-5)
+    assert any(limit.shadow_price for limit in result.limits)
     # report, files and picture show it
     assert SECTION.record is not None
     record = SECTION.record(result)["ranges"]["all"]
@@ -340,3 +343,24 @@ def test_a_limited_range_has_the_peak_of_its_value_too(tmp_path: Path) -> None:
     assert limited.tightest != limited.worst == limited.tops[0]
     assert limited.values[limited.worst] == pytest.approx(worst, rel=1e-9)
     assert limited.tightest in limited.tops[:2]
+
+
+def test_every_solved_problem_is_a_round(tmp_path: Path) -> None:
+    problem, programs = laufruhe.load(written(tmp_path)), []
+
+    def decide(program: laufruhe.Problem) -> Result:
+        programs.append(program)
+        return laufruhe.solve(program)
+
+    result = solve_ranges(problem, decide, decide)
+    assert result.details.rounds == len(programs)  # type: ignore[union-attr]
+    assert result.objective.value == pytest.approx(laufruhe.solve(problem).objective.value, rel=1e-9)  # type: ignore[union-attr]
+
+
+def test_a_value_that_rises_to_the_end_of_a_range_has_its_peak_there(tmp_path: Path) -> None:
+    _, whole = found(written(tmp_path))
+    resonance = RPM * float(whole.speeds[whole.worst])
+    narrow = f'["{0.9 * resonance} rpm", "{0.99 * resonance} rpm"]'
+    _, below = found(written(tmp_path, old='["1500 rpm", "7000 rpm"]', new=narrow))
+    assert below.tops[0] == below.worst == len(below.values) - 1
+    assert len(below.tops) == 1
