@@ -344,6 +344,8 @@ _UNITS = {
 }
 
 
+SLOW = 0.1
+"""Velocity below which reports use mm/s [m/s]."""
 _preferences: ContextVar[Mapping[str, str]] = ContextVar("units", default=MappingProxyType({}))
 
 
@@ -371,6 +373,11 @@ def readable(unit: str, usual: str = "") -> tuple[str, float]:
 def readable_unbalance(largest: float) -> tuple[str, float]:
     """Return the unit of reports for unbalances up to the largest one [kg m], and the factor: g mm, or kg m from 1."""
     return readable("kg m", "g mm" if largest < 1.0 else "kg m")
+
+
+def usual_unit(value: float, unit: str) -> str:
+    """Return the unit of reports for a value of this size: mm/s below 0.1 m/s, else empty for the usual one."""
+    return "mm/s" if unit == "m/s" and abs(value) < SLOW else ""
 
 
 def is_shown(unit: str) -> bool:

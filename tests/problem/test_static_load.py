@@ -74,6 +74,18 @@ def test_an_objective_at_its_static_part_says_so(name: str, static: float) -> No
     assert "No rotating part can bring the objective below it" in static_sentence(problem, evaluation)
 
 
+def test_norms_that_do_not_add_have_no_share() -> None:
+    problem = load(FOUR)
+    evaluation = evaluate(problem)
+    part = static_part(problem, evaluation)
+    assert part is not None
+    assert part.static + part.alternating > 1.01 * part.whole
+    sentence = static_sentence(problem, evaluation)
+    assert "160.5" not in sentence
+    assert "%" not in sentence
+    assert f"Without this mean the objective is {part.alternating:.4g} N" in sentence
+
+
 def test_an_alternating_objective_names_what_it_leaves_out() -> None:
     given = load(FOUR)
     problem, evaluation = with_loads(given, alternating=True), evaluate(given)

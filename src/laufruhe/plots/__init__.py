@@ -50,6 +50,7 @@ def figure(
     """
     if ax is not None and figure is not None:
         raise wrong_call("figure", figure, "stands beside ax", "give one of both")
+    result = result.at_own_points
     picture = import_module(PICTURES[name].module) if name in PICTURES else None
     if picture is None or not picture.applies(result):
         known = ", ".join(names(result))

@@ -27,7 +27,7 @@ from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.result import FINAL, INITIAL, Result
 from laufruhe.solvers.stars.ranking import PhasingResult
 from laufruhe.solvers.values import LimitValue
 
@@ -190,6 +190,11 @@ def is_changed(result: Result) -> bool:
 def designs_with_loads(result: Result) -> dict[str, Evaluation]:
     """Return the designs with finite loads, by name; the final design is always among them."""
     return {name: design for name, design in result.designs.items() if design is result.final or not design.resonance}
+
+
+def decided_design(result: Result) -> str:
+    """Return the name of the design that tables of one design show."""
+    return f"{FINAL if is_changed(result) else INITIAL} design"
 
 
 def evaluations_with_loads(result: Result) -> list[Evaluation]:

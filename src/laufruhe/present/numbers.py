@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from laufruhe.units import is_shown, readable
+from laufruhe.units import is_shown, readable, usual_unit
 
 if TYPE_CHECKING:
     from laufruhe.solvers.values import DecisionValue, LimitValue
@@ -51,7 +51,7 @@ def trimmed(value: float, digits: int = 4) -> str:
 
 def with_unit(value: float, unit: str) -> str:
     """Return a value in readable units: 90 deg, 2500 rpm, 1.25 kg."""
-    name, factor = readable(unit)
+    name, factor = readable(unit, usual_unit(value, unit))
     return f"{trimmed(value * factor)} {name}".rstrip()
 
 
@@ -63,7 +63,7 @@ def between(lower: float, upper: float, unit: str) -> str:
 
 def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
     """Return a number as `number` does, in readable units with the unit's name."""
-    name, factor = readable(unit)
+    name, factor = readable(unit, usual_unit(value, unit))
     return f"{number(value * factor, digits, scale * factor)} {name}".rstrip()
 
 

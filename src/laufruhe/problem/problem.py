@@ -81,6 +81,8 @@ class Extra:
     """
 
     words: ClassVar[str]
+    evaluates: ClassVar[bool] = False
+    """True if `evaluated` states the objective with this extension."""
 
     @property
     def open_names(self) -> tuple[str, ...]:

@@ -41,6 +41,7 @@ def as_json(result: Result, series: bool = False) -> str:
 
 def as_dict(result: Result, series: bool = False) -> Record:
     """Return the result as plain Python values; `series` adds loads over the cycle."""
+    objective, result = _objective(result), result.at_own_points
     problem, engine, proof = result.problem, result.final.engine, result.certificate
     points = [_point(result, k) for k in range(len(problem.points))]
     # a single operating point is at the top level
@@ -56,7 +57,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **_attributes(problem, "title source assumptions"),
         "status": str(result.status),
         **_attributes(result, "message conflict"),
-        "objective": _objective(result),
+        "objective": objective,
         "certificate": {"kind": str(proof.kind), **_attributes(proof, "lower_bound gap kkt_residual method")}
         if proof else no_proof,
         "decisions": {

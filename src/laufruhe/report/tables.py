@@ -294,7 +294,7 @@ _TABLES: NumberTables = {
 
 def write_tables(result: Result, folder: Path) -> None:
     """Write a CSV file for every table, and a workbook, into an existing folder."""
-    tables = number_tables(result)
+    tables = number_tables(result.at_own_points)
     for name, table in tables.items():
         write_csv(table, folder / f"{name}.csv")
     if tables:

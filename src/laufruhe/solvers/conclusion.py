@@ -287,14 +287,14 @@ def violation_message(problem: Problem, evaluation: Evaluation) -> str:
     return f"the best design found violates {names}; relax it, or open more numbers"
 
 
-def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
+def evaluate_only(problem: Problem, allow_resonance: bool = False, samples: int | None = None) -> Result:
     """Return the initial design as a result, without optimisation; infeasible if no firing order fits its throws.
 
     If `allow_resonance` is True, the design may stand on an undamped resonance, as the start of a search may.
     """
     started, requested = time.perf_counter(), problem
     problem = problem.drawing
-    evaluation = evaluate_start(problem) if allow_resonance else evaluate(problem)
+    evaluation = evaluate_start(problem) if allow_resonance else evaluate(problem, samples=samples)
     phasing = problem.phasing
     reason = why_no_order(phasing, phasing.throws) if phasing is not None and phasing.throws is not None else ""
     result = Result(

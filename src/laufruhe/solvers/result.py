@@ -6,7 +6,7 @@ import html
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -71,7 +71,15 @@ class Status(StrEnum):
 
 
 class ResultDetails:
-    """Additional data of a result that an extension provides."""
+    """Additional data of a result that an extension provides.
+
+    Attributes
+    ----------
+    own_points
+        Names of the operating points of the problem file; None for those of the problem.
+    """
+
+    own_points: Sequence[str] | None = None
 
     @property
     def measured(self) -> Evaluation | None:
@@ -208,6 +216,19 @@ class Result(ResultContent):
         """Evaluation whose objective the result states: that of `details`, or that of the final design."""
         measured = None if self.details is None else self.details.measured
         return self.final if measured is None else measured
+
+    @cached_property
+    def at_own_points(self) -> Result:
+        """Result with loads at the operating points of the problem file, without those of `details`."""
+        names = None if self.details is None else self.details.own_points
+        if names is None:
+            return self
+        designs = {
+            name: replace(design, loads=tuple(loads for loads in design.loads if loads.point.name in names))
+            for name, design in self.designs.items()
+        }
+        problem = replace(self.problem, points=tuple(point for point in self.problem.points if point.name in names))
+        return replace(self, problem=problem, initial=designs[INITIAL], final=designs.get(FINAL, designs[INITIAL]))
 
     @cached_property
     def error_estimate(self) -> float:

@@ -210,10 +210,16 @@ def test_cases_have_their_own_measures(tmp_path: Path) -> None:
 
 BAD = [
     (MISFIRE, 'opportunities = [4]\ndemands = ["1/3"]', "cannot fire 1/3 of 4 opportunities"),
-    (MISFIRE, 'opportunities = [4]\ndemands = ["5/4"]', "cannot fire 5/4"),
+    (MISFIRE, 'opportunities = [4]\ndemands = ["5/4"]', "is no share from 0 to 1"),
+    (MISFIRE, 'opportunities = [4]\ndemands = ["50"]', "is no share from 0 to 1"),
+    (MISFIRE, "opportunities = [4]\ndemands = [0.3]", "cannot fire 0.3 of 4 opportunities"),
     (MISFIRE, 'opportunities = [4]\ndemands = ["half"]', "is neither a share"),
     (MISFIRE, 'opportunities = [4]\ndemands = ["40 N m"]', "all give 34 N m"),
-    (MISFIRE, 'opportunities = [32]\ndemands = ["1/2"]', "more than 10000 patterns of 16 firings"),
+    (
+        MISFIRE,
+        'opportunities = [32]\ndemands = ["1/2"]',
+        "skip fire: opportunities = 32: has more than 10000 patterns of 16 firings",
+    ),
     (MISFIRE, 'opportunities = [4]\ndemands = ["1/2"]\noperating_point = "full"', "has no 'full'"),
     (
         MISFIRE,
@@ -236,6 +242,12 @@ BAD = [
     (MISFIRE, 'opportunities = []\ndemands = ["1/2"]', "opportunities"),
     (MISFIRE, 'opportunities = [4]\ndemands = ["1/2"]\nskipped = "stopped"', "closed valves"),
 ]
+
+
+@pytest.mark.parametrize("demand", ['"0.5"', "0.5", '"50 %"', '"50%"', '"2/4"'])
+def test_a_share_is_a_fraction_a_number_or_in_percent(tmp_path: Path, demand: str) -> None:
+    data = computed(tmp_path, study(MISFIRE, f"opportunities = [2]\ndemands = [{demand}]"))
+    assert data["firings"].values.tolist() == [1]
 
 
 @pytest.mark.parametrize(("problem", "keys", "said"), BAD)

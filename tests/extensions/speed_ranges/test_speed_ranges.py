@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.comparison.designs import Design
 from laufruhe.extensions.speed_ranges.exchange import solve_ranges
 from laufruhe.extensions.speed_ranges.peaks import Response
 from laufruhe.extensions.speed_ranges.picture import figure
@@ -24,6 +25,7 @@ from laufruhe.numerics.norms import RMS, Grid
 from laufruhe.present.measures import is_met
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.report.json_result import as_dict
 from laufruhe.solvers import Result
 
 RPM = 30.0 / math.pi
@@ -237,7 +239,8 @@ def test_a_curve_holds_at_every_speed(tmp_path: Path) -> None:
     record = SECTION.record(result)["ranges"]["all"]
     assert record["final"]["of_limit"] == ratio
     assert record["final"]["worst"] == pytest.approx(values.max(), rel=1e-5)
-    (table,) = SECTION.tables(result)
+    table, peaks = SECTION.tables(result)
+    assert peaks.rows
     assert [row[1] for row in table.rows] == ["initial", "final"]
     rows = SECTION.number_tables["over-speed-ranges"][1](result).rows
     assert max(row[3] / row[4] for row in rows if row[1] == "final") == pytest.approx(ratio)
@@ -259,7 +262,7 @@ def test_an_evaluation_shows_ranges_and_the_state_of_their_curves(tmp_path: Path
     problem = laufruhe.load(written(tmp_path, f'{curve}speeds = ["1500 rpm", "7000 rpm"]\nminimise = true\n'))
     assert ", 1 limit;" in problem.summary
     result = laufruhe.evaluate(problem)
-    (table,) = SECTION.tables(result)
+    table, peaks = SECTION.tables(result)
     assert [row[:2] for row in table.rows] == [("all", "initial"), ("whole", "initial")]
     _, response = found(written(tmp_path))
     worst = response.values[response.worst]
@@ -268,6 +271,24 @@ def test_an_evaluation_shows_ranges_and_the_state_of_their_curves(tmp_path: Path
     assert result.objective.value == pytest.approx(worst)
     assert max(limit.value for limit in result.limits) == pytest.approx(worst)
     assert not any(is_met(limit) for limit in result.limits)
+    # peaks are in ascending order of speed, with their order, and tables of loads leave them out
+    assert {f"{order:g}" for order, _ in response.strongest_at(response.tops[:4])} == {
+        row[4].partition(",")[0] for row in peaks.rows if row[0] == "whole"
+    }
+    assert len(result.problem.points) > 1
+    assert [loads.point.name for loads in result.at_own_points.final.loads] == ["road"]
+    assert [point["name"] for point in as_dict(result)["points"]] == ["road"]
+
+
+def test_a_comparison_evaluates_the_range_for_another_design(tmp_path: Path) -> None:
+    problem = laufruhe.load(written(tmp_path, "minimise = true\n"))
+    record, engine = as_dict(laufruhe.evaluate(problem)), problem.design([0.02])
+    first, second = Design("a", record, {}, problem, problem.engine), Design("b", record, {}, problem, engine)
+    base = replace(problem.changed(extras=()), engine=engine)
+    response = Response(base, evaluate(base), problem.extra(SpeedRanges).ranges[0])  # type: ignore[union-attr]
+    assert second.value_for(first) == pytest.approx(response.values[response.worst])
+    assert second.value_for(first) != pytest.approx(first.value_for(first))
+    assert first.has_objective_of(second)
 
 
 def test_worst_rms_is_a_norm_with_its_dual() -> None:

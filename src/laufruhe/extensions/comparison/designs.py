@@ -17,11 +17,11 @@ from laufruhe.errors import InputError, ModelError, refused
 from laufruhe.files.reader import display_path, load, load_tables, tables_and_path
 from laufruhe.machine import Engine
 from laufruhe.problem.channels import Channel
-from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.files import RESULT
 from laufruhe.report.json_result import as_json
 from laufruhe.report.saved_result import SavedResult, read_result
+from laufruhe.solvers import evaluate_only
 from laufruhe.solvers.result import Status
 
 SAME = 1e-6
@@ -65,10 +65,11 @@ class Design:
 
     def has_objective_of(self, other: Design) -> bool:
         """Return True if the problem of another design has the same objective, operating points and fidelity."""
-        pair = (self.problem, other.problem)
-        first, second = (problem and (problem.objective, problem.points, problem.fidelity) for problem in pair)
-        is_plain = not any(problem and problem.extras for problem in pair)
-        return first is not None and is_plain and first == second
+        one, two = self.problem, other.problem
+        if one is None or two is None or not all(extra.evaluates for extra in one.extras):
+            return False
+        names = ("objective", "points", "fidelity", "extras")
+        return all(getattr(one, name) == getattr(two, name) for name in names)
 
     def value_for(self, other: Design) -> float | None:
         """Return the objective of another design's problem for this design; None if it has no such value.
@@ -80,7 +81,9 @@ class Design:
         if other is self:
             value = self.record["objective"]["value"]
             return None if value is None else float(value)
-        if self.engine is None or other.problem is None or other.problem.extras:
+        if self.engine is None or other.problem is None:
+            return None
+        if not all(extra.evaluates for extra in other.problem.extras):
             return None
         channels = [term.measure.channel for term in other.problem.objective]
         if not all(channel.needs.of(self.engine) for channel in channels):
@@ -88,7 +91,7 @@ class Design:
         if _places(self.engine, channels) != _places(other.problem.engine, channels):
             return None
         with suppress(ModelError):
-            value = objective_value(other.problem, evaluate(other.problem, self.engine, other.samples))
+            value = _value(replace(other.problem, engine=self.engine), other.samples)
             return value if math.isfinite(value) else None
         return None
 
@@ -122,12 +125,17 @@ def _saved(result: SavedResult, path: Path, name: str) -> Design:
         if with_values.phasing is not None:
             return replace(design, note="its firing order was open; give the problem file")
         if result.objective is not None:
-            value = objective_value(with_values, evaluate(with_values, samples=design.samples))
+            value = _value(with_values, design.samples)
             if math.isclose(value, result.objective.value, rel_tol=SAME):
                 return replace(design, problem=problem, engine=with_values.engine)
     except (InputError, ModelError) as error:
         return replace(design, note=str(error).partition(": ")[2])
     return replace(design, note="its problem file and decisions do not reproduce the objective")
+
+
+def _value(problem: Problem, samples: int) -> float:
+    objective = evaluate_only(problem, samples=samples).objective
+    return math.nan if objective is None else objective.value
 
 
 def _places(engine: Engine, channels: Sequence[Channel]) -> list[list[str]]:

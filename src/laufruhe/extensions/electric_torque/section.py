@@ -10,6 +10,7 @@ import numpy as np
 
 from laufruhe.extensions.electric_torque.channels import ELECTRIC_TORQUE
 from laufruhe.extensions.electric_torque.machine import ElectricMachines, machines_of
+from laufruhe.present.measures import decided_design
 from laufruhe.present.numbers import figure, number, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import evaluate
@@ -62,8 +63,9 @@ def _tables(result: Result) -> list[Table]:
         sizes = ("" if facts[key] is None else figure(facts[key], unit) for key, unit in columns.items())
         rows.append((facts["point"], name, words or "none", *sizes))
     note = (
-        "Final design: amplitude a and angle b stand for a cos(order x crank angle + b). Electric power: mechanical "
-        "power of the mean torque, and copper loss. An alternating torque takes and gives back equal energy."
+        f"{decided_design(result).capitalize()}: amplitude a and angle b stand for a cos(order x crank angle + b). "
+        "Electric power: mechanical power of the mean torque, and copper loss. "
+        "An alternating torque takes and gives back equal energy."
     )
     of_limits = "; ".join(_limit_words(result))
     note += f" Limits of the torque: {of_limits}." if of_limits else ""

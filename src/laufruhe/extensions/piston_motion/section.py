@@ -11,6 +11,7 @@ from laufruhe.extensions.piston_motion.channels import RODS, reversals_at
 from laufruhe.extensions.piston_motion.motion import Extreme, PistonMotion, piston_motion, pistons_of
 from laufruhe.machine import SliderCrank
 from laufruhe.physics.bearing_loads import has_bearing_loads
+from laufruhe.present.measures import decided_design
 from laufruhe.present.numbers import number, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.problem.loads import PointLoads
@@ -68,7 +69,8 @@ def _tables(result: Result) -> list[Table]:
     columns = [(name, *column) for name, *column in zip(head, *texts, strict=True) if any(column)]
     head, *texts = zip(*columns, strict=True)
     note = (
-        "Final design, at the mean speed of the crank. Angles behind 'at' [deg]: own crank after top dead centre, "
+        f"{decided_design(result).capitalize()}, at the mean speed of the crank. "
+        "Angles behind 'at' [deg]: own crank after top dead centre, "
         "which an offset turns away from the cylinder axis."
     )
     if any(name == "reversals" for name in head):

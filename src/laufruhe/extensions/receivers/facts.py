@@ -18,6 +18,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
+from laufruhe.units import readable, usual_unit
 
 SPEEDS = 90
 SLOWEST, FASTEST = 0.5, 1.2
@@ -53,6 +54,12 @@ def has_receivers(result: Result) -> bool:
 def unit_of(receiver: Receiver) -> str:
     """Return the SI unit of a receiver."""
     return CHANNELS[receiver.quantity].unit
+
+
+def unit_and_factor(receiver: Receiver, largest: float) -> tuple[str, float]:
+    """Return the unit of reports for a receiver whose largest value is `largest` [SI], and the factor on SI values."""
+    unit = unit_of(receiver)
+    return readable(unit, usual_unit(largest, unit))
 
 
 def weighting_words(receiver: Receiver) -> str:

@@ -13,7 +13,7 @@ from laufruhe.extensions.receivers.facts import (
     amplitudes_of,
     has_receivers,
     over_speed,
-    unit_of,
+    unit_and_factor,
     weighting_words,
 )
 from laufruhe.extensions.receivers.machine import FrequencyFunction, Receiver, receivers_of
@@ -88,15 +88,19 @@ def _draw_spectrum(
     curves: list[Weighting | FrequencyFunction],
 ) -> None:  # fmt: skip
     top = axis_end(float(answer.plain.max(initial=0.0)) for answer in answers)
-    seen = [answer.frequencies[answer.plain > SHARE * top] for answer in answers]
+    unit, factor = unit_and_factor(receiver, top)
+    top *= factor
+    seen = [answer.frequencies[factor * answer.plain > SHARE * top] for answer in answers]
     drawn = np.concatenate([*seen, [10.0]])
     low, high = 0.7 * float(drawn.min()), 1.4 * float(drawn.max())
     for j, (item, answer) in enumerate(zip(series, answers, strict=True)):
-        visible = answer.plain > SHARE * top
+        visible = factor * answer.plain > SHARE * top
         # designs side by side
         places = answer.frequencies[visible] * (1.0 + 0.012 * (2 * j - len(series) + 1))
-        axes.vlines(places, 0.0, answer.weighted[visible], color=item.colour, linewidth=2.4)
-        axes.plot(places, answer.plain[visible], linestyle="none", marker="_", markersize=7.0, color=item.colour)
+        axes.vlines(places, 0.0, factor * answer.weighted[visible], color=item.colour, linewidth=2.4)
+        axes.plot(
+            places, factor * answer.plain[visible], linestyle="none", marker="_", markersize=7.0, color=item.colour
+        )
     inside = np.geomspace(max(low, receiver.band[0]), min(high, receiver.band[1]), 300)
     for curve, style in zip(curves, STYLES, strict=False):
         if curve in receiver.weightings:
@@ -106,21 +110,23 @@ def _draw_spectrum(
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(FuncFormatter(lambda *_: ""))
-    axes.set_ylabel(f"{receiver.name} [{unit_of(receiver)}]")
+    axes.set_ylabel(f"{receiver.name} [{unit}]")
 
 
 def _draw_speeds(
     axes: Axes, receiver: Receiver, result: Result, series: list[Series], points: list[OperatingPoint]
 ) -> None:
     top = 0.0
+    sizes = [amplitudes_of(receiver, loads).rms for item in series for loads in item.design.loads]
+    unit, factor = unit_and_factor(receiver, max(sizes))
     for item in series:
         for point, style in zip(points, STYLES, strict=False):
             speeds, values = over_speed(receiver, result.problem, item.design, point)
-            axes.plot(RPM * speeds, values, color=item.colour, linestyle=style, linewidth=1.6)
-            top = max(top, float(np.nanmax(values, initial=0.0)))
-        dots = [(RPM * loads.point.speed, amplitudes_of(receiver, loads).rms) for loads in item.design.loads]
+            axes.plot(RPM * speeds, factor * values, color=item.colour, linestyle=style, linewidth=1.6)
+            top = max(top, factor * float(np.nanmax(values, initial=0.0)))
+        dots = [(RPM * loads.point.speed, factor * amplitudes_of(receiver, loads).rms) for loads in item.design.loads]
         axes.plot(*zip(*dots, strict=True), linestyle="none", marker="o", markersize=4.5, color=item.colour)
     axes.set(xlim=(RPM * speeds[0], RPM * speeds[-1]), ylim=(0.0, 1.15 * top or 1.0), xlabel="crank speed [rpm]")
     words = weighting_words(receiver)
-    axes.set_ylabel(f"rms, {'no weighting' if words == 'none' else words} [{unit_of(receiver)}]")
+    axes.set_ylabel(f"rms, {'no weighting' if words == 'none' else words} [{unit}]")
     mark_points(axes, result)

@@ -9,7 +9,7 @@ import numpy as np
 
 from laufruhe.extensions.receivers.facts import OrderAmplitudes, amplitudes_of, has_receivers, unit_of, weighting_words
 from laufruhe.extensions.receivers.machine import receivers_of
-from laufruhe.present.measures import designs_with_loads
+from laufruhe.present.measures import decided_design, designs_with_loads
 from laufruhe.present.numbers import figure, number
 from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
@@ -30,8 +30,8 @@ def _tables(result: Result) -> list[Table]:
                 figure(answer.rms, unit), _strongest(answer),
             ))  # fmt: skip
     note = (
-        "Root mean square of the final design over the cycle, without direction weights of objective and limits. "
-        "Strongest: the frequencies with the largest weighted amplitudes."
+        f"Root mean square of the {decided_design(result)} over the cycle, without direction weights of objective and "
+        "limits. Strongest: the frequencies with the largest weighted amplitudes."
     )
     head = ("at", "receiver", "weighting", "without weighting", "weighted", "strongest")
     return [Table(head, tuple(rows), title="What receivers feel", left=3, note=note, file="receivers")]

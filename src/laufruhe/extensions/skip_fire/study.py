@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field, PlainValidator, WithJsonSchema
 
 from laufruhe import units
-from laufruhe.errors import plural
+from laufruhe.errors import plural, refused
 from laufruhe.extensions.skip_fire.patterns import count_patterns, is_even, patterns
 from laufruhe.extensions.skip_fire.torque import FiringModel
 from laufruhe.files import fields as f
@@ -33,18 +33,35 @@ from laufruhe.studies.text import Text, marked_table, number
 if TYPE_CHECKING:
     import xarray as xr
 
-FRACTION = re.compile(r"(\d+)/(\d+)")
 MAX_PATTERNS, LISTED, DRAWN, STEPS, ALIKE = 10_000, 8, 4, 72, 1e-9
 """Most patterns to compare, to list, comparisons to draw, steps of torque over a turn, and relative rounding."""
 
 
-def _checked(demand: str) -> str:
-    if not FRACTION.fullmatch(demand):
+def _share_of(demand: str) -> Fraction | None:
+    # share of opportunities that fire: "2/3", "0.5" or "50 %"; None for a torque
+    text = demand.removesuffix("%").rstrip()
+    try:
+        return Fraction(text) / (1 if text == demand else 100)
+    except (ValueError, ZeroDivisionError):
+        return None
+
+
+def _checked(demand: object) -> str:
+    text = str(demand).strip() if isinstance(demand, str | int | float) and not isinstance(demand, bool) else ""
+    share = _share_of(text)
+    if share is None:
         try:
-            units.parse(demand, "N m")
+            units.parse(text, "N m")
         except units.UnitError as error:
-            raise f.refusal(f'is neither a share, such as "2/3", nor a torque: {error}') from None
-    return demand
+            raise f.refusal(f'is neither a share, such as "2/3", 0.5 or "50 %", nor a torque: {error}') from None
+    elif not 0 <= share <= 1:
+        raise f.refusal('is no share from 0 to 1; write "2/3", 0.5 or "50 %", or a torque such as "90 N m"')
+    return text
+
+
+Demand: TypeAlias = Annotated[
+    str, PlainValidator(_checked), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
+]
 
 
 class PatternMeasureTable(QuantityTable):
@@ -60,7 +77,7 @@ class SkipFirePart(Part):
     opportunities: list[Annotated[int, Field(ge=1, le=32)]] = Field(
         min_length=1, description="Lengths of patterns in opportunities to fire; a cycle has one of each cylinder."
     )
-    demands: list[Annotated[str, AfterValidator(_checked)]] = Field(
+    demands: list[Demand] = Field(
         min_length=1, description="Shares of opportunities that fire, or mean torques.", examples=[["2/3", "90 N m"]]
     )
     skipped: Literal["closed valves", "open valves", "misfire"] = f.optional(
@@ -116,18 +133,21 @@ class SkipFirePart(Part):
         for length in self.opportunities:
             model = replace(model, cycles=math.lcm(length, count) // count)
             for demand in self.demands:
-                if share := FRACTION.fullmatch(demand):
-                    firings = length * int(share[1]) / max(int(share[2]), 1)
-                else:
+                share = _share_of(demand)
+                if share is None:
                     share_of_torque = (units.parse(demand, "N m") - idle) / (full - idle)
-                    firings = max(math.ceil(length * (share_of_torque - ALIKE)), 0)
+                    firings = Fraction(max(math.ceil(length * (share_of_torque - ALIKE)), 0))
+                else:
+                    firings = length * share
                 if firings > length or firings % 1:
                     rule = f"cannot fire {demand} of {length} opportunities"
-                    remedy = f"give a multiple of {share[2]} opportunities" if share else f"all give {full:.4g} N m"
+                    remedy = f"all give {full:.4g} N m"
+                    if share is not None:
+                        remedy = f"give a multiple of {share.denominator} opportunities"
                     raise problem_files.refused(case, "engine", rule, remedy)
                 if count_patterns(length, int(firings), math.gcd(count, length)) > MAX_PATTERNS:
                     rule = f"has more than {MAX_PATTERNS} patterns of {int(firings)} firings in {length} opportunities"
-                    raise problem_files.refused(case, "engine", rule, "compare shorter patterns")
+                    raise refused("opportunities", str(length), rule, "compare shorter patterns", self.kind)
                 comparisons[length, int(firings)] = model
         return measures, comparisons
 
@@ -195,12 +215,14 @@ class SkipFirePart(Part):
         for title, rows in _comparisons_in(data)[:DRAWN]:
             orders, (unit, factor) = rows["order"].values[1:], units.readable(str(rows["measure_unit"].values[0]))
             torques, sizes, patterns = list[p.Mark](), list[p.Mark](), rows["pattern"].values[[0, -1]]
-            for k, colour, word in ((-1, "before", "worst pattern"), (0, "after", "smoothest pattern")):
+            ends = ((-1, "before", "worst pattern"), (0, "after", "smoothest pattern"))
+            # patterns of one class have one curve
+            for k, colour, word in ends[rows.sizes["point"] == 1 :]:
                 row, label = rows.isel(point=k), "" if panels else word
                 torques.append(p.Line(rows["angle"].values, row["torque"].values, colour, label))
                 sizes.append(p.Bars(orders, factor * row["amplitude"].values[1:], 0.1 if k == 0 else 0.2, colour))
             panels.append(p.Panel(torques, p.Axis("crank angle [deg]"), p.Axis("crank torque [N m]"),
-                                  f"{title}: {patterns[0]}, worst {patterns[1]}"))  # fmt: skip
+                                  f"{title}: {', worst '.join(dict.fromkeys(patterns))}"))  # fmt: skip
             panels.append(p.Panel(sizes, p.Axis("order of crank speed"), p.Axis(f"amplitude [{unit or 'N m'}]")))
         words = f"Torque of the smoothest and the worst pattern, and orders. Measure: {data['measure'].values[0]}."
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), (4.2, 2.4), 2, 0.7)

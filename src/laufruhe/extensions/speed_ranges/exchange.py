@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
-from laufruhe.errors import InputError, ModelError, SolverError
+from laufruhe.errors import InputError, ModelError, SolverError, counted
 from laufruhe.extensions.speed_ranges.peaks import RangeResponses, Response
 from laufruhe.extensions.speed_ranges.ranges import SpeedRange, SpeedRanges, Speeds, at_speeds, with_speeds
 from laufruhe.files.complaints import Refused
@@ -74,7 +74,7 @@ def _refuse_ranges(problem: Problem) -> None:
 def solve_ranges(problem: Problem, decide: Callable[[Problem], Result], _: Callable[[Problem], Result]) -> Result:
     """Return the best design of a problem with speed ranges; `decide` solves the problem at finitely many speeds."""
     ranges = _ranges_of(problem)
-    base = problem.changed(extras=(), origin=problem.origin)
+    base, names = problem.changed(extras=(), origin=problem.origin), tuple(point.name for point in problem.points)
     start = evaluate_start(base)
     initial = tuple(Response(base, start, span) for span in ranges)
     speeds = {one.span.name: {one.span.low, one.span.high, *_tops(one)} for one in initial}
@@ -102,19 +102,19 @@ def solve_ranges(problem: Problem, decide: Callable[[Problem], Result], _: Calla
     if best is None:
         raise SolverError("no design for the speed ranges was found within the time limit; raise the time limit")
     result, final, used = best
-    return _conclusion(base, ranges, used, result, bound, RangeResponses(initial, final, rounds))
+    return _conclusion(base, ranges, used, result, bound, RangeResponses(initial, final, rounds, names))
 
 
 def evaluate_ranges(problem: Problem, result: Result) -> Result:
     """Return the result of an initial design with its responses over the ranges, and limits at their peaks."""
     _refuse_ranges(problem)
-    ranges, base = _ranges_of(problem), problem.changed(extras=(), origin=problem.origin)
-    responses = tuple(Response(base, result.initial, span) for span in ranges)
+    ranges, base, start = _ranges_of(problem), problem.changed(extras=(), origin=problem.origin), result.initial
+    responses = tuple(Response(base, start, span) for span in ranges)
     peaks = _sorted({one.span.name: set(_tops(one)[:PEAKS_IN_TABLES]) for one in responses})
-    at_peaks = at_speeds(base, ranges, peaks)
-    design = evaluate(at_peaks)
+    at_peaks, names = at_speeds(base, ranges, peaks), tuple(point.name for point in problem.points)
+    design = evaluate(at_peaks, start.engine, start.samples)
     return replace(
-        result, problem=at_peaks, initial=design, final=design, details=RangeResponses(responses, responses, 0),
+        result, problem=at_peaks, initial=design, final=design, details=RangeResponses(responses, responses, 0, names),
         objective=ObjectiveValue.of_initial(at_peaks, design), limits=limit_values(at_peaks, design),
         error=partial(objective_error, at_peaks, design),
     )  # fmt: skip
@@ -173,7 +173,9 @@ def _conclusion(
     )  # fmt: skip
     violated = final.violation(problem.limits) > FEASIBILITY_TOL and bool(result.certificate)
     if violated:
-        message = f"{violation_message(problem, final)}; {details.rounds} rounds of exchange did not satisfy it"
+        message = (
+            f"{violation_message(problem, final)}; {counted(details.rounds, 'round')} of exchange did not satisfy it"
+        )
         result = replace(result, status=Status.FAILED, certificate=None, message=message)
     if objective is None:
         return replace(result, limits=limit_values(problem, final))
@@ -185,7 +187,8 @@ def _conclusion(
     if certificate is not None and certificate.kind is not Proof.NONE:
         certificate = make_certificate(
             value, bound, zero_level, problem.tolerance, _STRENGTHS[certificate.kind], certificate.kkt_residual,
-            f"{certificate.method}; exchange of speeds, {details.rounds} rounds, peaks by search", value_error,
+            f"{certificate.method}; exchange of speeds, {counted(details.rounds, 'round')}, peaks by search",
+            value_error,
         )  # fmt: skip
         status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     return replace(

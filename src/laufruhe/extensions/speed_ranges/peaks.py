@@ -125,8 +125,12 @@ class Response:
     @cached_property
     def strongest(self) -> tuple[float, float]:
         """Order with the largest amplitude at the largest value, and its amplitude [SI]."""
-        orders, sizes = self.amplitudes(self.speeds[[self.worst]])
-        return float(orders[np.argmax(sizes[0])]), float(sizes[0].max())
+        return self.strongest_at([self.worst])[0]
+
+    def strongest_at(self, indices: Sequence[int]) -> list[tuple[float, float]]:
+        """Return the order with the largest amplitude at speeds of these indices, and its amplitude [SI]."""
+        orders, sizes = self.amplitudes(self.speeds[[*indices]])
+        return [(float(orders[np.argmax(row)]), float(row.max())) for row in sizes]
 
     @property
     def mean(self) -> float:
@@ -149,11 +153,14 @@ class RangeResponses(ResultDetails):
         Response over each range.
     rounds
         Count of problems that were solved.
+    own_points
+        Names of the operating points of the problem file.
     """
 
     initial: tuple[Response, ...]
     final: tuple[Response, ...]
     rounds: int
+    own_points: tuple[str, ...]
 
 
 def _peaks(height: Callable[[float], float], samples: Array) -> Iterator[float]:

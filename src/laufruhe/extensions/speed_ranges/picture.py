@@ -22,7 +22,7 @@ from laufruhe.plots.words import FAINT, INK, SMALL, label_of
 from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import RPM
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
+from laufruhe.units import readable, usual_unit
 
 applies = has_ranges
 MAX_RANGES, MAX_NAMES, SPEEDS = 2, 8, 120
@@ -59,7 +59,7 @@ def figure(result: Result) -> Figure:
 
 def _draw_response(axes: Axes, designs: list[tuple[str, Response]]) -> None:
     one = designs[-1][1]
-    unit, factor = readable(one.measure.unit)
+    unit, factor = readable(one.measure.unit, usual_unit(float(one.values.max()), one.measure.unit))
     tops = []
     for k, (_, response) in enumerate(designs):
         colour = AFTER if k == len(designs) - 1 else BEFORE

@@ -94,6 +94,7 @@ class SpeedRanges(Extra):
     """Speed ranges that a problem reports, minimises or limits."""
 
     words: ClassVar[str] = "speed ranges"
+    evaluates: ClassVar[bool] = True
     ranges: tuple[SpeedRange, ...] = field(default=())
 
     @property

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from laufruhe.extensions.speed_ranges.peaks import RangeResponses, Response
+from laufruhe.extensions.speed_ranges.peaks import NEAR, RangeResponses, Response
 from laufruhe.present.measures import is_changed
-from laufruhe.present.numbers import RPM, figure, number
+from laufruhe.present.numbers import DASH, RPM, figure, number
 from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import FINAL, INITIAL, Result
 
 HEAD = ("range", "design", "quantity", "worst", "at", "strongest order", "of limit", "at", "mean over time")
+PEAKS = 4
+"""Most peaks of a design over a range that a table lists."""
 
 
 def responses_of(result: Result) -> RangeResponses:
@@ -50,7 +52,24 @@ def _tables(result: Result) -> list[Table]:
         "Worst: the largest value at any speed of the range, found between samples (P23). Strongest order: that with "
         "the largest amplitude there, before it is averaged."
     )
-    return [Table(HEAD, rows, title="Over ranges of speed", left=3, note=note, file="speed-ranges")]
+    return [Table(HEAD, rows, title="Over ranges of speed", left=3, note=note, file="speed-ranges"), _peaks(result)]
+
+
+def _peaks(result: Result) -> Table:
+    rows = []
+    for design, one in designs_of(result):
+        tops = sorted(one.tops[:PEAKS])
+        for k, (order, amplitude) in zip(tops, one.strongest_at(tops), strict=True):
+            value, unit = float(one.values[k]), one.measure.unit
+            limit = f"{100.0 * value / float(one.limits[k]):.1f} %" if one.span.limit is not None else DASH
+            strongest = f"{order:g}, {figure(amplitude, unit)}"
+            rows.append((one.span.name, design, _rpm(one, k), figure(value, unit), strongest, limit))
+    note = (
+        f"At most {PEAKS} peaks of the value or of its share of the limit, each with at least {100.0 * NEAR:g} % of "
+        "the highest. An end of a range may be a peak."
+    )
+    head = ("range", "design", "at", "value", "strongest order", "of limit")
+    return Table(head, rows, title="Peaks over ranges of speed", left=2, note=note, file="speed-range-peaks")
 
 
 def _rpm(one: Response, k: int) -> str:
@@ -82,7 +101,8 @@ def _over_speed(result: Result) -> Table:
 
 
 SECTION = Section(
-    "speed_ranges", has_ranges, _tables, _record, ("speed-ranges",), {"over-speed-ranges": (has_ranges, _over_speed)},
+    "speed_ranges", has_ranges, _tables, _record, ("speed-ranges", "speed-range-peaks"),
+    {"over-speed-ranges": (has_ranges, _over_speed)},
 )  # fmt: skip
 PICTURE = ResultPicture(
     "speed_ranges",

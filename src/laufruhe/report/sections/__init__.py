@@ -16,6 +16,7 @@ SECTIONS = (
 
 def tables_of(result: Result) -> list[Table]:
     """Return the tables of a result, in the order of a report."""
+    result = result.at_own_points
     core = [tables(result) for tables in SECTIONS]
     added = [section.tables(result) for section in EXTENSION_SECTIONS.values() if section.applies(result)]
     return [grid for grids in (*core, *added) for grid in grids if grid.rows]

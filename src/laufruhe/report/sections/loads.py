@@ -33,7 +33,7 @@ from laufruhe.problem.evaluation import place_measures
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
+from laufruhe.units import readable, usual_unit
 
 MAX_ORDERS, SHARE = 8, 0.005
 TORQUE = (
@@ -63,8 +63,9 @@ def _at_places(result: Result, places: Places) -> Table:
             names, *(place_measures(design, k, places.channel) for design in designs), strict=True
         )
     ]
-    unit, factor = readable(places.channel.unit)
-    scale = factor * max((by_design[0].max for _, by_design in measures), default=0.0)
+    largest = max((by_design[0].max for _, by_design in measures), default=0.0)
+    unit, factor = readable(places.channel.unit, usual_unit(largest, places.channel.unit))
+    scale = factor * largest
     rows = [(*lead, *_cells([values.times(factor) for values in by_design], scale)) for lead, by_design in measures]
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The initial design has no finite loads: {result.initial.resonance}. " if result.initial.resonance else ""

@@ -27,7 +27,7 @@ from laufruhe.solvers.values import (
     RankValue,
     relevant_decisions,
 )
-from laufruhe.units import readable
+from laufruhe.units import readable, usual_unit
 
 STATED_ERROR = 1e-5
 """Relative error of a value from which the note states it."""
@@ -86,7 +86,7 @@ def limits(result: Result) -> list[Table]:
 
 
 def _limit(limit: LimitValue, unit: str, decided: bool) -> tuple[str, ...]:
-    name, factor = readable(limit.unit)
+    name, factor = readable(limit.unit, usual_unit(limit.value, limit.unit))
     state = "broken" if not is_met(limit) else "active" if limit.active else "slack"
     value = f"{number(limit.value * factor, scale=limit.limit * factor)} {name}"
     bound = ("" if limit.side == "at most" else f"{limit.side} ") + with_unit(limit.limit, limit.unit)
