@@ -30,7 +30,7 @@ Row = tuple[str, str, str, str]
 DESIGNS = 10_000
 TURNS = 3
 STAR_SECONDS = 300.0
-"""By the clock, on all processors; 19 throws take 250 s of a processor."""
+"""Time limit on all processors [s]; 19 throws take 250 s of a processor."""
 CLOSE = 0.2
 THREADED = ("tractor-four-lanchester", "tractor-two")
 # solves are repeated so often that a process lives long enough for its clock

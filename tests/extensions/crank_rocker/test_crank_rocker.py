@@ -57,7 +57,7 @@ def circles(first: np.ndarray, radius: float, other: Any, reach: float, side: in
 
 
 def masses(part: CrankRocker) -> list[moving.Mass]:
-    """All masses from geometry alone."""
+    """Derive all masses from geometry alone."""
     alpha = part.shaft.ratio * moving.angles() + part.throw - part.bank
     crank = part.crank_radius * np.exp(1j * alpha)
     pin = circles(crank, part.coupler_length, part.pivot, part.arm, part.side)

@@ -87,7 +87,7 @@ def test_equal_masses_and_a_weight_on_each_crank_leave_nothing(
 
 
 def test_other_masses_leave_the_higher_orders_of_a_slider_crank() -> None:
-    """Of two masses the difference moves as a piston, on both cranks alike (K4)."""
+    """The difference of two masses moves as a piston, on both cranks alike (K4)."""
     parts = halves(0.9, 0.7)
     loads = shaking_loads(Engine("rhombic", Cycle.TWO_STROKE, parts), AT).coefficients
     single = halves(0.2, 0.0)[0]

@@ -163,7 +163,7 @@ def test_the_best_is_the_least_of_every_pattern(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_half_of_a_vee_eight_fires_every_other_cylinder(tmp_path: Path) -> None:
-    """As in production: every other cylinder in the firing order (A. Rayl in EV World, 14 December 2004)."""
+    """Production engines fire every other cylinder of the firing order (A. Rayl in EV World, 14 December 2004)."""
     set_wheel = '\n[study.parts.cases.set]\n"flywheel.inertia" = "0.4 kg m^2"\n"fidelity.samples" = 720\n'
     keys = 'opportunities = [8]\ndemands = ["1/2"]\nmeasures = [{ quantity = "degree of irregularity" }]'
     data = computed(tmp_path, study(VEE, keys) + set_wheel)
