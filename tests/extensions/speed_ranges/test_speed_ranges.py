@@ -244,7 +244,9 @@ def test_a_curve_holds_at_every_speed(tmp_path: Path) -> None:
     assert [row[1] for row in table.rows] == ["initial", "final"]
     rows = SECTION.number_tables["over-speed-ranges"][1](result).rows
     assert max(row[3] / row[4] for row in rows if row[1] == "final") == pytest.approx(ratio)
-    assert len(figure(result).axes) == 2
+    panels = figure(result).axes
+    assert len(panels) == 2
+    assert panels[0].get_ylabel() == "rms receiver acceleration [m/s²]"
 
 
 def test_the_mean_has_the_shares_of_time(tmp_path: Path) -> None:

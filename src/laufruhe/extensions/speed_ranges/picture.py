@@ -18,9 +18,10 @@ from laufruhe.extensions.speed_ranges.peaks import Response
 from laufruhe.extensions.speed_ranges.section import designs_of, has_ranges, responses_of
 from laufruhe.plots.speed_axis import LIMIT, STYLES
 from laufruhe.plots.style import AFTER, BEFORE, axis_end, entry, entry_of_dots, finish_page, page, styled
-from laufruhe.plots.words import FAINT, INK, SMALL, label_of
+from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import RPM
+from laufruhe.problem.measure import Measure
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable, usual_unit
 
@@ -71,7 +72,9 @@ def _draw_response(axes: Axes, designs: list[tuple[str, Response]]) -> None:
         axes.plot(RPM * one.speeds, factor * one.limits, color=LIMIT, linewidth=1.6, linestyle=STYLES[1])
         tops.append(float(factor * one.limits.max()))
     axes.set(xlim=(RPM * one.span.low, RPM * one.span.high), ylim=(0.0, 1.1 * axis_end(tops)))
-    axes.set(xlabel="crank speed [rpm]", ylabel=label_of(one.measure.name, unit, 2.4), title=one.span.name)
+    # the table has orders, places and weights of the measure
+    name = Measure(one.measure.channel, one.measure.norm).name
+    axes.set(xlabel="crank speed [rpm]", ylabel=f"{name} [{unit}]", title=one.span.name)
 
 
 def _draw_orders(axes: Axes, one: Response) -> dict[str, Any]:
