@@ -7,7 +7,9 @@ mean the same wherever they stand have their words in `hover.toml`.
 from __future__ import annotations
 
 import json
+import re
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -182,7 +184,36 @@ def _schema(model: type[BaseModel], kept: Callable[[Any], Any] = lambda found: f
 
 
 def _text(schema: dict[str, Any]) -> str:
-    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps(_named(schema), indent=2, ensure_ascii=False) + "\n"
+
+
+def _named(schema: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema with each kind of number under one name, to which keys and tables refer."""
+    names: dict[str, str] = {}
+    kinds: dict[str, Any] = {}
+    counts: Counter[str] = Counter()
+
+    def refer(node: Any) -> Any:
+        if isinstance(node, list):
+            return [refer(each) for each in node]
+        if not isinstance(node, dict):
+            return node
+        if "x-taplo" not in node and ("anyOf" in node or "between" in node.get("properties", {}) or "pattern" in node):
+            text = json.dumps(node)
+            if text not in names:
+                dimension = re.search(r'"x-dimension": "([^"]+)"', text)
+                word = dimension[1].partition(" ")[2].replace(" ", "-") if dimension else "value"
+                counts[word] += 1
+                names[text] = f"{word}-{counts[word]}"
+                kinds[names[text]] = {key: refer(value) for key, value in node.items()}
+            return {"$ref": f"#/definitions/{names[text]}"}
+        return {key: refer(value) for key, value in node.items()}
+
+    tables = {
+        name: {key: refer(value) for key, value in table.items()} for name, table in schema["definitions"].items()
+    }
+    whole = {key: refer(value) for key, value in schema.items() if key != "definitions"}
+    return whole | {"definitions": tables | dict(sorted(kinds.items()))}
 
 
 def _with_catalogue_key(schema: dict[str, Any]) -> None:
