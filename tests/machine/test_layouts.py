@@ -127,7 +127,7 @@ class TestOpposedPistons:
     def of(ratio: float, lead: float = 0.0, count: int = 3) -> Engine:
         throws = even_throws(TWO, inline(count, 0.1), list(range(1, count + 1)))
         lower, _ = build(TWO, inline(count, 0.1), MECHANISM, throws)
-        upper = facing_pistons(lower, Shaft("upper", ratio, 0.0, 0.6), lead, 0.8)
+        upper = facing_pistons(lower, Shaft("upper", ratio, 0.0, 0.6), lead)
         return Engine("opposed", TWO, (*lower, *upper))
 
     @pytest.mark.parametrize("ratio", [1.0, -1.0])

@@ -31,7 +31,7 @@ from laufruhe.machine.layouts import (
     even_throws,
     rod_of,
 )
-from laufruhe.numerics.exact_angles import as_turn, direction
+from laufruhe.numerics.exact_angles import as_turn, cis, direction
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrWord(list[CylinderNumber], "[1, 3, 4, 2]")]
@@ -268,8 +268,12 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     if gas and kind.has_pistons and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, but gas pressure acts on the piston", "add it")
     if kind.is_free:
-        parts = _sharing_chambers(table, _free_parts(table), gas)
-        return parts, tuple(Throw(p.x, p.throw, (k,), shaft=p.shaft) for k, p in enumerate(parts))
+        parts, masses = _free_parts(table)
+        cranks = tuple(
+            Throw(p.x, p.throw, (k,), masses[k] * p.crank_radius * cis(as_turn(p.throw)), p.shaft)
+            for k, p in enumerate(parts)
+        )
+        return _sharing_chambers(table, parts, gas), cranks
     inputs, layout = _layout_input(table, gas), layout_of(table)
     throws = _throws(table, layout)
     with errors_at_key("engine.firing_order" if table.listed_order else "engine"):
@@ -482,7 +486,8 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     return radius, rod
 
 
-def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
+def _free_parts(table: EngineTable) -> tuple[tuple[SliderCrank, ...], list[float]]:
+    # slider-cranks, and the rotating mass without rods at the pin of each [kg]
     if not table.slider_cranks:
         raise Refused("engine.slider_cranks", None, "is missing", "list at least one [[engine.slider_cranks]]")
     shafts = {"crankshaft": CRANKSHAFT}
@@ -494,7 +499,7 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
     # slider-cranks on one throw share the rotating mass of the throw
     pins = [(part.shaft, part.x, direction(part.throw)) for part in table.slider_cranks if part.rotating_mass is None]
-    parts = []
+    parts, masses = [], []
     for k, part in enumerate(table.slider_cranks, 1):
         where = f"engine.slider_cranks[{k}]"
         if part.shaft not in shafts:
@@ -506,14 +511,15 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         carrying_shaft, rotating = shafts[part.shaft], part.rotating_mass
         if rotating is None:
             rotating = table.rotating_mass / pins.count((part.shaft, part.x, direction(part.throw)))
+        masses.append(rotating)
         with errors_at_key(where):
             mechanism, _ = _mechanism(table.model_copy(update=overrides))
             centre = part.bank_angle - part.throw + mechanism.part.fires_at
             first = centre / carrying_shaft.ratio % (math.tau / abs(carrying_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first
-            parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, carrying_shaft))
-    parts = _in_order(table, parts)
-    return parts_with_leads(parts, {shaft.name: Open.from_value(shaft.lead).start for shaft in table.shafts})
+            parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, carrying_shaft))
+    parts, leads = _in_order(table, parts), {shaft.name: Open.from_value(shaft.lead).start for shaft in table.shafts}
+    return parts_with_leads(parts, leads), masses
 
 
 def _in_order(table: EngineTable, parts: list[SliderCrank]) -> list[SliderCrank]:

@@ -33,18 +33,13 @@ class Mechanism:
     rotating_mass: float = 0.0
     pin_mass: float | None = None
 
-    def mass_at_pin(self, cylinders: int) -> float:
-        """Return the rotating mass without rods that belongs to this one of several cylinders on a throw [kg]."""
-        return self.rotating_mass / cylinders if self.pin_mass is None else self.pin_mass
-
     def cylinder(
-        self, number: int, x: float, throw: float, bank: float, firing_angle: float, pin_mass: float = 0.0,
-        shaft: Shaft = CRANKSHAFT,
-    ) -> SliderCrank:  # fmt: skip
-        """Return the slider-crank of a cylinder, with a mass at the crank pin without the rod's share [kg]."""
+        self, number: int, x: float, throw: float, bank: float, firing_angle: float, shaft: Shaft = CRANKSHAFT
+    ) -> SliderCrank:
+        """Return the slider-crank of a cylinder."""
         return replace(
             self.part, name=f"{self.part.noun} {number}", x=x, throw=throw, bank=bank, firing_angle=firing_angle,
-            rotating_mass=pin_mass + self.part.rotating_mass, shaft=shaft,
+            shaft=shaft,
         )  # fmt: skip
 
 
@@ -187,4 +182,5 @@ def throw_unbalance(mechanisms: Sequence[Mechanism]) -> float:
     first, count = mechanisms[0], len(mechanisms)
     if all(mechanism.pin_mass is None for mechanism in mechanisms):
         return first.rotating_mass * first.part.crank_radius
-    return sum(mechanism.mass_at_pin(count) for mechanism in mechanisms) * first.part.crank_radius
+    masses = (one.rotating_mass / count if one.pin_mass is None else one.pin_mass for one in mechanisms)
+    return sum(masses) * first.part.crank_radius

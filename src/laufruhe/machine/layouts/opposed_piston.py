@@ -10,19 +10,17 @@ from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.layouts.banks import Inline
 from laufruhe.machine.layouts.base import CRANK_DISTANCE, OF_CYLINDER, LayoutInput, LayoutKey
-from laufruhe.machine.layouts.build import Throw
+from laufruhe.machine.layouts.build import Throw, throw_unbalance
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import Shaft
 from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.exact_angles import as_turn, cis
 
 
-def facing_pistons(
-    lower: Sequence[SliderCrank], crank: Shaft, lead: float = 0.0, pin_mass: float = 0.0
-) -> tuple[SliderCrank, ...]:
+def facing_pistons(lower: Sequence[SliderCrank], crank: Shaft, lead: float = 0.0) -> tuple[SliderCrank, ...]:
     """Return the second pistons of opposed-piston cylinders, upside down on a crank of their own.
 
     The lower ones stand upright on the crankshaft; the second ones come to their dead centre first by the lead [rad].
-    The mass at their crank pins is without the rods' shares [kg].
     """
     if abs(crank.ratio) != 1.0:
         raise ModelError(f"an opposed-piston engine needs a crank ratio of 1 or -1, got {crank.ratio:g}")
@@ -34,7 +32,6 @@ def facing_pistons(
             name=f"{part.name} upper",
             bank=math.pi,
             throw=math.pi + crank.ratio * (part.throw + lead),
-            rotating_mass=part.rotating_mass + pin_mass,
             firing_angle=part.firing_angle - lead,
             shaft=crank,
         )
@@ -77,14 +74,12 @@ class OpposedPiston(Inline):
             rule = f"is beyond the ports, which are open for {units.quantity_text(ports, 'rad')} and never together"
             raise KeyedError("crank_lead", f"{rule}; lessen it", units.quantity_text(lead, "rad"))
         crank = Shaft("second crankshaft", float(inputs.options["crank_ratio"] or -1), 0.0, inputs.crank_distance)
-        upper = list[SliderCrank]()
-        for k, part in enumerate(lower):
+        upper, above = list[SliderCrank](), list[Throw]()
+        for k, second in enumerate(facing_pistons(lower, crank, lead)):
             of_cylinder = inputs.of(k)
-            (second,) = facing_pistons([part], crank, lead, of_cylinder.mechanism.mass_at_pin(1))
             second_mass = of_cylinder.options["second_reciprocating_mass"]
-            if second_mass is not None:
-                heavier = second_mass - of_cylinder.piston_mass
-                second = replace(second, reciprocating_mass=second.reciprocating_mass + heavier)
-            upper.append(second)
-        above = tuple(Throw(p.x, p.throw, (len(lower) + k,), shaft=crank) for k, p in enumerate(upper))
+            heavier = 0.0 if second_mass is None else second_mass - of_cylinder.piston_mass
+            upper.append(replace(second, reciprocating_mass=second.reciprocating_mass + heavier))
+            unbalance = throw_unbalance([of_cylinder.mechanism]) * cis(as_turn(second.throw))
+            above.append(Throw(second.x, second.throw, (len(lower) + k,), unbalance, crank))
         return (*lower, *upper), (*cranks, *above)
