@@ -72,8 +72,8 @@ def left_out() -> frozenset[Path]:
     """Return the folders of tests of extensions that no change reaches."""
     folders = {path.name: path for path in (ROOT / TESTS).iterdir() if path.is_dir() and path.name != "__pycache__"}
     changed = changed_files()
-    kept = set(folders) if changed is None else reached(folders, changed)
-    return frozenset(path for name, path in folders.items() if name not in kept)
+    selected = set(folders) if changed is None else reached(folders, changed)
+    return frozenset(path for name, path in folders.items() if name not in selected)
 
 
 def ignores(path: Path, config: pytest.Config) -> bool:

@@ -50,10 +50,10 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     core_seconds.mark_listed(config, items)
     lanes.mark_long(items)
-    wanted = bool(config.getoption("--long"))
+    with_long = bool(config.getoption("--long"))
     sorted_out: dict[bool, list[pytest.Item]] = {True: [], False: []}
     for item in items:
-        sorted_out[(item.get_closest_marker("long") is not None) == wanted].append(item)
+        sorted_out[(item.get_closest_marker("long") is not None) == with_long].append(item)
     items[:] = sorted_out[True]
     config.hook.pytest_deselected(items=sorted_out[False])
 

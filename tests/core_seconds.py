@@ -88,8 +88,8 @@ class CoreSeconds:
                 terminalreporter.write_line(f"and {len(further)} further")
 
     def _relist(self, over: set[str]) -> None:
-        kept = {name for name in listed_now() if name not in self.spent and is_there(name)}
-        LISTED.write_text(_HEAD + "".join(f"{name}\n" for name in sorted(kept | over)), encoding="utf-8")
+        names = {name for name in listed_now() if name not in self.spent and is_there(name)}
+        LISTED.write_text(_HEAD + "".join(f"{name}\n" for name in sorted(names | over)), encoding="utf-8")
 
 
 def is_there(name: str) -> bool:

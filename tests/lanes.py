@@ -35,8 +35,8 @@ def mark_long(items: Iterable[pytest.Item]) -> None:
 
 def left_out(cases: Sequence[Any], count: int) -> list[Any]:
     """Return all cases of a family but so many, which stand at equal steps."""
-    kept = {k * len(cases) // count for k in range(count)}
-    return [case for k, case in enumerate(cases) if k not in kept]
+    chosen = {k * len(cases) // count for k in range(count)}
+    return [case for k, case in enumerate(cases) if k not in chosen]
 
 
 def first_fast(values: Iterable[Any], fast: int, usual: int | None = None, long: Collection[Any] = ()) -> list[Any]:

@@ -35,7 +35,7 @@ from laufruhe.problem.problem import Problem
 DIGITS = 50
 STEPS, GAS_ORDERS = 24, 90
 # as many orders as are kept have no corners
-KEPT = Fidelity(samples=STEPS, gas_samples=4 * GAS_ORDERS, gas_orders=GAS_ORDERS)
+FINE = Fidelity(samples=STEPS, gas_samples=4 * GAS_ORDERS, gas_orders=GAS_ORDERS)
 FREE = 1e-20
 """Of a stiffness over the largest: what is under it is a direction that no mount carries."""
 WHOLE_LOADS = Measure(channels.SHAKING_FORCE, NORMS["mean"]), Measure(channels.ROLL_MOMENT, NORMS["mean"])
@@ -66,7 +66,7 @@ def rigid_part(problem: Problem) -> RigidPart:
     shaking force and roll moment.
     """
     own = tuple(term.measure for term in problem.objective if _is_covered(term.measure, problem.engine))
-    used = replace(problem, fidelity=KEPT)
+    used = replace(problem, fidelity=FINE)
     if not own:
         used = replace(used, points=problem.points[:1])
     evaluation, errors, names = evaluate(used), [], []
@@ -130,7 +130,7 @@ def _gas_torque(engine: Engine, gas: GasModel) -> Digits:
     """Roll moment of the gas at every step, every firing in its place (L5)."""
     series: list[Any] = [mpmath.mpc(0)] * (2 * GAS_ORDERS + 1)
     for part in engine.slider_cranks:
-        torque = gas_coefficients(gas, part, engine.cycle, KEPT).coefficients
+        torque = gas_coefficients(gas, part, engine.cycle, FINE).coefficients
         late = -_exact(as_turn(part.firing_angle)) / engine.cycle.turns
         for h, value in enumerate(torque):
             series[h] += mpmath.mpc(complex(value)) * mpmath.expjpi(2 * h * late)

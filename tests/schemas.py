@@ -37,7 +37,7 @@ _PLAIN = {
     "object": "table",
 }
 _NUMBERS: Mapping[str, Any] = {"integer": 1, "number": 1.0, "string": "text", "boolean": True}
-TOLD = "Engine of the catalogue (laufruhe engines) that supplies every key which this table does not give."
+CATALOGUE_TEXT = "Engine of the catalogue (laufruhe engines) that supplies every key which this table does not give."
 HOVER = ("description", "examples", "x-taplo")
 """What of a key an editor shows."""
 # a table within tables within a table is told by where it stands itself
@@ -45,7 +45,7 @@ _DEPTH = 4
 
 
 @cache
-def _told() -> dict[str, dict[str, Any]]:
+def _texts() -> dict[str, dict[str, Any]]:
     return tomllib.loads(WORDS.read_text(encoding="utf-8"))
 
 
@@ -74,9 +74,9 @@ def _short(name: str) -> str:
 
 def _words(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str) -> str:
     """What is told of this key alone, what its table says of itself, or what is told of the key wherever it stands."""
-    told, of_table = _told()["words"], _of_table(schema, entry)
+    words, of_table = _texts()["words"], _of_table(schema, entry)
     own = "" if of_table == ANYWHERE else of_table
-    return str(told.get(path) or own or told.get(path.rpartition(".")[2], ""))
+    return str(words.get(path) or own or words.get(path.rpartition(".")[2], ""))
 
 
 def kind(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
@@ -133,16 +133,16 @@ def _of_table(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
 
 def _example(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str, depth: int) -> Any:
     """A value that may stand for a key."""
-    told = _told()["examples"]
-    if path in told:
-        return told[path]
+    examples = _texts()["examples"]
+    if path in examples:
+        return examples[path]
     if entry.get("examples"):
         return entry["examples"][0]
     if (default := entry.get("default")) and not any("x-dimension" in one for one in alternatives(schema, entry)):
         return default
     key = path.rpartition(".")[2]
-    if key in told and not _of_table(schema, entry):
-        return told[key]
+    if key in examples and not _of_table(schema, entry):
+        return examples[key]
     return _of(schema, next(alternatives(schema, entry)), depth)
 
 
@@ -156,8 +156,8 @@ def _of(schema: Mapping[str, Any], one: Mapping[str, Any], depth: int) -> Any:
         example = _example(schema, one.get("items", {}), "", depth)
         return [example] * max(1, int(one.get("minItems", 1)))
     if "properties" in one:
-        wanted = (one.get("required") or list(one["properties"])[:1]) if depth else []
-        inner = {key: (one["properties"][key], f"{one.get('title', '')}.{key}") for key in wanted}
+        required = (one.get("required") or list(one["properties"])[:1]) if depth else []
+        inner = {key: (one["properties"][key], f"{one.get('title', '')}.{key}") for key in required}
         return {key: _example(schema, entry, path, depth - 1) for key, (entry, path) in inner.items()}
     return _NUMBERS.get(str(one.get("type")), {})
 
@@ -172,9 +172,9 @@ def schema() -> str:
     return _text(problem_schema())
 
 
-def _schema(model: type[BaseModel], kept: Callable[[Any], Any] = lambda found: found) -> dict[str, Any]:
+def _schema(model: type[BaseModel], selector: Callable[[Any], Any] = lambda found: found) -> dict[str, Any]:
     """In the draft that editors support; what is kept of it is explained."""
-    found = kept(model.model_json_schema(ref_template="#/definitions/{model}"))
+    found = selector(model.model_json_schema(ref_template="#/definitions/{model}"))
     whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
     whole["definitions"] = whole.pop("$defs")
     if "EngineTable" in whole["definitions"]:
@@ -223,7 +223,7 @@ def _with_catalogue_key(schema: dict[str, Any]) -> None:
     """
     required, names = schema.pop("required"), list(engines())
     schema["type"], schema["pattern"] = ["object", "string"], f"^({'|'.join(names)})$"
-    schema["properties"] = {KEY: {"description": TOLD, "enum": names}, **schema["properties"]}
+    schema["properties"] = {KEY: {"description": CATALOGUE_TEXT, "enum": names}, **schema["properties"]}
     pistons = {"required": [*required, "stroke", "reciprocating_mass"]}
     without = {
         "properties": {"layout": {"enum": [k for k, v in LAYOUTS.items() if not v.has_pistons]}},
@@ -240,8 +240,8 @@ def study_schema() -> str:
     keys: dict[str, Any] = {}
     for name in kinds.values():
         found["definitions"][name].pop("required", None)
-        told = found["definitions"][name]["properties"]
-        keys |= {key: {word: one[word] for word in HOVER} for key, one in told.items()}
+        properties = found["definitions"][name]["properties"]
+        keys |= {key: {word: one[word] for word in HOVER} for key, one in properties.items()}
     # a condition for each kind: an editor then marks the key that is wrong, and not the whole part
     holder["items"] = {
         "type": "object",

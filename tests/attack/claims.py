@@ -81,17 +81,17 @@ def solved(table: Table, folder: Path, name: str = "problem") -> Any:
 @contextlib.contextmanager
 def silence_heard(wrong: list[str]):
     """Count as a defect what is printed or warned of meanwhile."""
-    heard = io.StringIO()
+    messages = io.StringIO()
     with (
         warnings.catch_warnings(record=True) as caught,
-        contextlib.redirect_stdout(heard),
-        contextlib.redirect_stderr(heard),
+        contextlib.redirect_stdout(messages),
+        contextlib.redirect_stderr(messages),
     ):
         warnings.simplefilter("always")
         yield
     wrong += [f"warns: {w.category.__name__}: {str(w.message)[:150]}" for w in caught[:2]]
-    if heard.getvalue().strip():
-        wrong.append(f"prints: {heard.getvalue().strip()[:150]}")
+    if messages.getvalue().strip():
+        wrong.append(f"prints: {messages.getvalue().strip()[:150]}")
 
 
 def tried(verdict: Verdict, work: Callable[[], list[str]]) -> Verdict:

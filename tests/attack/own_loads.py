@@ -210,7 +210,7 @@ def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
     ratio = float(gas.get("compression_ratio", 17.0))
     minimum, maximum = 1.0 / (ratio - 1.0), ratio / (ratio - 1.0)
     entering, leaving = (si(gas.get(f"{k}_pressure", AIR)) for k in ("intake", "exhaust"))
-    wanted = si(point.get("imep", gas.get("imep", 0.0))) - (entering - leaving if s.turns == 2 else 0.0)
+    target = si(point.get("imep", gas.get("imep", 0.0))) - (entering - leaving if s.turns == 2 else 0.0)
 
     def volume(a: Any) -> Any:
         return minimum + (high - s.height(a)) / (high - low)
@@ -218,7 +218,7 @@ def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
     bends = [top, bottom, top + 2 * math.pi, bottom + 2 * math.pi]
     make = {"seiliger": _mixed, "wiebe": _released}[gas["model"]]
     pressure, more = make(
-        gas, bool(point.get("motored", False)), wanted, volume, (top, bottom), (minimum, maximum), entering
+        gas, bool(point.get("motored", False)), target, volume, (top, bottom), (minimum, maximum), entering
     )
     a, w = _panels([*bends, *more], whole)
     g = a.copy()
@@ -235,7 +235,7 @@ def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
     return work
 
 
-def _mixed(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
+def _mixed(gas: Table, motored: bool, target: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
     """Pressure of the closed part of a Seiliger cycle, and where it bends besides."""
     top, bottom = dead
     minimum, maximum = ends
@@ -249,7 +249,7 @@ def _mixed(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, end
 
     spent, peak = work(n1, peak, minimum, maximum), si(gas["peak_pressure"])
     cut = brentq(
-        lambda v: peak * (v - minimum) + work(n2, peak, v, maximum) - spent - wanted,
+        lambda v: peak * (v - minimum) + work(n2, peak, v, maximum) - spent - target,
         minimum,
         maximum,
         xtol=1e-16,
@@ -265,7 +265,7 @@ def _mixed(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, end
     return pressure, [at]
 
 
-def _released(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
+def _released(gas: Table, motored: bool, target: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
     """The same with finite heat release: p v^k grows by (k - 1) q v^(k - 1) db."""
     _, bottom = dead
     _, maximum = ends
@@ -297,7 +297,7 @@ def _released(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, 
         # the work of either part over what is closed
         rise = volume(a + 1e-40j).imag / 1e-40
         did = [float(np.sum(np.where(closed, part * rise * w, 0.0))) for part in (cold, hot)]
-        return cold + hot * (wanted - did[0]) / did[1]
+        return cold + hot * (target - did[0]) / did[1]
 
     return pressure, [start, start + long]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from attack.crossings import CROSSINGS
 
-WANTED = 2000
+TARGET = 2000
 SEEDS = 3
 """What the attack is meant to reach: so many problems of every family, from so many first seeds together."""
 VARIED = 30
@@ -131,7 +131,7 @@ def family_row(family: str, lines: list[dict[str, Any]]) -> str:
     """Return the row of a group of families."""
     firsts = ", ".join(str(sum(line["seed"] // 100000 == k for line in lines)) for k in range(SEEDS))
     wrong = sum(bool(line["wrong"]) for line in lines)
-    return f"| {family} | {len(lines)} | {firsts} | {max(0, WANTED - len(lines))} | {wrong} |"
+    return f"| {family} | {len(lines)} | {firsts} | {max(0, TARGET - len(lines))} | {wrong} |"
 
 
 def page(logs: list[Path], names: list[str]) -> str:
@@ -148,7 +148,7 @@ def page(logs: list[Path], names: list[str]) -> str:
         HEAD,
         "## What was run\n",
         f"{len(every)} problems, {rivals} rival designs or stars; {len(wrong)} problems with something wrong. "
-        f"Meant are {WANTED} problems of every family, drawn from {SEEDS} first seeds (0, 100000, 200000), and "
+        f"Meant are {TARGET} problems of every family, drawn from {SEEDS} first seeds (0, 100000, 200000), and "
         f"{VARIED} of every variation; *short* is what is left of that.\n",
         f"Commits: {', '.join(f'{name} ({count})' for name, count in commits.most_common())}. "
         "A problem that was run again counts by its last run.\n",

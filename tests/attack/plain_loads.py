@@ -209,7 +209,7 @@ def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, who
     """Absolute pressure where a chamber is so far from its smallest volume, so many strokes after it fires."""
     e, n1, n2 = (gas.get(k, d) for k, d in DEFAULTS.items() if k in ("compression_ratio", *EXPONENTS))
     intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
-    peak, wanted = number(gas["peak_pressure"]), number(gas["imep"])
+    peak, target = number(gas["peak_pressure"]), number(gas["imep"])
     v = 1.0 / (e - 1.0) + share
     small, large = 1.0 / (e - 1.0), e / (e - 1.0)
 
@@ -227,7 +227,7 @@ def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, who
         mean = 0.5 * (pressure(cut_off) + np.roll(pressure(cut_off), -1))
         return float(np.sum(mean * (np.roll(v, -1) - v)))
 
-    cut_off = brentq(lambda c: imep(c) - wanted, 1.0, e, xtol=1e-12)
+    cut_off = brentq(lambda c: imep(c) - target, 1.0, e, xtol=1e-12)
     return pressure(cut_off)
 
 

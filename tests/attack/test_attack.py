@@ -72,7 +72,7 @@ def test_what_is_true_is_not_complained_of(example: tuple[Table, Result]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("lie", "heard"),
+    ("lie", "message"),
     [
         (lambda r: replace(r, objective=replace(r.objective, value=0.999 * r.objective.value)), "value"),
         (lambda r: replace(r, certificate=replace(r.certificate, lower_bound=1.001 * r.objective.value)), "bound"),
@@ -81,9 +81,9 @@ def test_what_is_true_is_not_complained_of(example: tuple[Table, Result]) -> Non
     ],
     ids=["value", "bound", "infeasible", "failed"],
 )
-def test_a_lie_is_found_out(lie: Any, heard: str, example: tuple[Table, Result]) -> None:
+def test_a_lie_is_found_out(lie: Any, message: str, example: tuple[Table, Result]) -> None:
     table, result = example
-    assert heard in complaints(table, lie(result))
+    assert message in complaints(table, lie(result))
 
 
 def test_a_design_that_is_not_the_best_is_found_out(example: tuple[Table, Result], tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def complaints(table: Table, result: Any) -> str:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("lie", "heard"),
+    ("lie", "message"),
     [
         (lambda r: r, ""),
         (lambda r: replace(r, objective=replace(r.objective, value=1.00001 * r.objective.value)), "by the own model"),
@@ -124,8 +124,8 @@ def complaints(table: Table, result: Any) -> str:
     ],
     ids=["truth", "value", "bound", "infeasible"],
 )  # fmt: skip
-def test_a_lie_is_found_out(lie: Any, heard: str, example: tuple[Table, Result]) -> None:
+def test_a_lie_is_found_out(lie: Any, message: str, example: tuple[Table, Result]) -> None:
     table, result = example
     lines = complaints(table, lie(result))
-    assert heard in lines
-    assert bool(heard) == bool(lines)
+    assert message in lines
+    assert bool(message) == bool(lines)

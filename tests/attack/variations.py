@@ -215,12 +215,12 @@ def _as_good(result: Any, other: Any, factor: float, what: str) -> Complaints:
         return [f"{what}: {other.status.value} in place of {result.status.value}"]
     if result.objective is None:
         return []
-    value, wanted = other.objective.value / factor, result.objective.value
+    value, target = other.objective.value / factor, result.objective.value
     floor = 1e-9 * result.objective.initial
     wrong: Complaints = []
     note = "" if is_global(result) and is_global(other) else "note: local: "
-    if abs(value - wanted) > doubt(result) + doubt(other) / factor + floor:
-        wrong.append(f"{note}{what}: {value:.9g} in place of {wanted:.9g}")
+    if abs(value - target) > doubt(result) + doubt(other) / factor + floor:
+        wrong.append(f"{note}{what}: {value:.9g} in place of {target:.9g}")
     if result.certificate.kind != other.certificate.kind:
         gaps = f"{other.certificate.gap:.1e} for {result.certificate.gap:.1e}"
         wrong.append(f"{what}: {other.certificate.kind.value} in place of {result.certificate.kind.value} (gap {gaps})")

@@ -26,7 +26,7 @@ results has none, or all of one run. What a crash of the machine leaves is not t
 """
 
 
-def page(counts: kills.Told, studies: int, points: int, solves: int) -> str:
+def page(counts: kills.Log, studies: int, points: int, solves: int) -> str:
     """Return the page: what was tried, and how often each outcome occurred."""
     rows = [f"| {what} | {count} |" for what, count in sorted(counts.tried.items())]
     wrong = [f"- {line}" for line in counts.wrong] or ["None."]
@@ -44,7 +44,7 @@ def main() -> None:
     """Try as many as asked."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else TRIED
     with tempfile.TemporaryDirectory() as name:
-        whole, counts = kills.uninterrupted(Path(name) / "whole"), kills.Told()
+        whole, counts = kills.uninterrupted(Path(name) / "whole"), kills.Log()
         for seed in range(count):
             kills.attacked(Path(name) / "s", seed, whole, counts)
         solved = solve_kills.uninterrupted(Path(name) / "solved")

@@ -35,7 +35,7 @@ OUT = PAGES / "multibody.md"
 FloatArray = NDArray[np.float64]
 
 SAMPLES = 720
-WANTED = 1e-5
+TOLERANCE = 1e-5
 STEPS = (360, 720, 960, 1200, 1320, 1440, 1560, 1680, 1800, 2160, 2880)
 REPEATS = 9
 MOUNTS = tuple(
@@ -123,7 +123,7 @@ def least_steps(scene: Scene) -> tuple[int, float]:
     tried = []
     for steps in STEPS:
         tried.append((steps, error(scene, steps)))
-        if tried[-1][1] <= WANTED:
+        if tried[-1][1] <= TOLERANCE:
             return tried[-1]
     return min(tried, key=lambda trial: trial[1])
 
@@ -182,7 +182,7 @@ def main() -> None:
         "",
         "The simulation (exudyn, generalised-alpha, 12 rigid bodies, the build without range checks, sparse matrices,",
         "kept Jacobians) is the integration of one turn alone, with the fewest steps of those tried that reach an",
-        f"error of {WANTED:.0e} of the largest mount force once a tenth of the turn has settled the start. The",
+        f"error of {TOLERANCE:.0e} of the largest mount force once a tenth of the turn has settled the start. The",
         f"analytic side is the shaking loads with exact kinematics, the mounting, and the forces at {SAMPLES} angles.",
         f"Medians of {REPEATS} runs taken in turns on one machine, in processor time.",
         "",

@@ -125,11 +125,11 @@ def force_times(engine: Engine, point: OperatingPoint) -> dict[str, float]:
     plain, loops = plain_engine(engine, point, SAMPLES), compiled()
     ratio, speed = engine.slider_cranks[0].rod_ratio, point.speed
     package = own_forces(engine, point)
-    answers = [plain.forces(ratio, speed), plain.kept(ratio)(speed)]
+    answers = [plain.forces(ratio, speed), plain.truncated(ratio)(speed)]
     answers += [] if loops is None else [by_numba(loops, plain, ratio, speed)]
     for answer in answers:
         assert np.abs(answer - package).max() < AGREES * np.abs(package).max()
-    with_orders = plain.kept(ratio)
+    with_orders = plain.truncated(ratio)
     times = {"NumPy, everything anew": best(lambda k: plain.forces(ratio + 1e-6 * k, speed))}
     times["NumPy, new speed, rest kept"] = best(lambda k: with_orders(speed + 1e-4 * k))
     times["numba, everything anew"] = (

@@ -24,7 +24,7 @@ COLOURS = 64
 LIVE, STEPS = "tractor-four-lanchester.toml", 12
 VIEW = {"viewport": {"width": 1280, "height": 900}, "device_scale_factor": 0.7}
 # arguments of the command; picture that it draws; name under docs/pictures
-WANTED = {
+CHOSEN_PICTURES = {
     ("solve", "tractor-four-lanchester"): {"bars": "tractor-four-lanchester-bars"},
     ("balance", "vee-eight-balance-job"): {"planes": "balance-job"},
     ("solve", "tractor-seat"): {"receivers": "tractor-seat-receivers"},
@@ -110,7 +110,7 @@ def main() -> None:
         print(chromium.MISSING)
     if "--live" in sys.argv[1:]:
         return
-    for (command, name), pictures in WANTED.items():
+    for (command, name), pictures in CHOSEN_PICTURES.items():
         with tempfile.TemporaryDirectory() as folder:
             problem = ROOT / "problems" / f"{name}.toml"
             subprocess.run(

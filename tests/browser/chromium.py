@@ -94,8 +94,8 @@ def violations(page: Page) -> list[dict[str, object]]:
     if not page.evaluate("() => 'axe' in window"):
         page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
     # of what is well one example will do
-    asked = "() => axe.run({ resultTypes: ['violations'] }).then(found => found.violations)"
-    return page.evaluate(asked)  # type: ignore[no-any-return]
+    script = "() => axe.run({ resultTypes: ['violations'] }).then(found => found.violations)"
+    return page.evaluate(script)  # type: ignore[no-any-return]
 
 
 def serious(page: Page) -> list[str]:

@@ -48,14 +48,14 @@ def test_only_files_and_this_machine_are_reached(reached: Watched, address: str,
     assert sorted(refused) == ["http://192.0.2.2/c", "https://example.org/a.png", "ws://192.0.2.1/b"]
 
 
-@pytest.mark.parametrize("asked", ["http://127.0.0.1.example.org/", "https://a/", "ws://192.0.2.1/"])
-def test_other_machines_are_foreign(asked: str) -> None:
-    assert foreign(asked)
+@pytest.mark.parametrize("url", ["http://127.0.0.1.example.org/", "https://a/", "ws://192.0.2.1/"])
+def test_other_machines_are_foreign(url: str) -> None:
+    assert foreign(url)
 
 
-@pytest.mark.parametrize("asked", ["http://127.0.0.1:80/x", "file:///x", "data:,x"])
-def test_this_machine_is_not(asked: str) -> None:
-    assert not foreign(asked)
+@pytest.mark.parametrize("url", ["http://127.0.0.1:80/x", "file:///x", "data:,x"])
+def test_this_machine_is_not(url: str) -> None:
+    assert not foreign(url)
 
 
 def test_axe_finds_what_cannot_be_read(page: Page) -> None:

@@ -28,9 +28,9 @@ def test_numbers_are_those_of_the_exact_model(page: Page, tmp_path, name):
         found = evaluated(problem, model, values)
         if problem.objective:
             assert shown["objective"] == pytest.approx(objective_value(problem, found), rel=1e-11)
-        told = {name for name, _ in model.without_slider}
+        exact_limits = {name for name, _ in model.without_slider}
         for limit in problem.limits:
-            if limit.name not in told:
+            if limit.name not in exact_limits:
                 value = found.check_limit(limit).value
                 assert shown[limit.name] == pytest.approx(value, rel=1e-11, abs=1e-12)
     assert page.evaluate("laufruheLive.page.then(page => page.checked)") < 1e-11
@@ -147,14 +147,14 @@ def test_a_typed_text_that_is_no_number_is_refused_in_one_line(shown, typed):
 
 
 def test_another_model_keeps_the_sliders_that_it_still_has(shown):
-    kept = shown.evaluate("""async () => {
+    numbers = shown.evaluate("""async () => {
         const page = await laufruheLive.page, model = JSON.parse(document.getElementById("live-model").textContent);
         page.setDesign({"web.mass": 0.5, "left.unbalance": 0.01});
         await page.setModel(model);
         return page.design();
     }""")
-    assert kept["web.mass"] == 0.5
-    assert kept["left.unbalance"] == 0.01
+    assert numbers["web.mass"] == 0.5
+    assert numbers["left.unbalance"] == 0.01
 
 
 def test_figures_follow_every_load(shown):
@@ -172,6 +172,6 @@ NUMBERS = [0.0, 1.0, 999.96, 1234.5678, 0.00012345, 9.99e-5, 12345678.9, -3.1415
 
 
 def test_numbers_are_written_as_in_the_report(shown):
-    asked = "laufruheLive.number"
-    assert shown.evaluate(f"all => all.map(value => {asked}(value))", NUMBERS) == [number(each) for each in NUMBERS]
+    script = "laufruheLive.number"
+    assert shown.evaluate(f"all => all.map(value => {script}(value))", NUMBERS) == [number(each) for each in NUMBERS]
     assert math.isclose(float(number(0.5)), 0.5)

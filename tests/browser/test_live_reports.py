@@ -95,13 +95,13 @@ def solved(page: Page) -> Page:
     return page
 
 
-def told(page: Page) -> str:
+def objective_shown(page: Page) -> str:
     return page.locator("[data-measure=objective]").inner_text()
 
 
 def test_the_report_opens_at_the_optimum(solved: Page) -> None:
     result = json.loads((pages.made("solve").parent / "result.json").read_text())
-    assert told(solved) == figure(result["objective"]["value"], "N")
+    assert objective_shown(solved) == figure(result["objective"]["value"], "N")
     regret = solved.locator("[data-role=regret]")
     assert "optimum" in regret.inner_text()
     assert "proven" in regret.inner_text()
@@ -110,7 +110,7 @@ def test_the_report_opens_at_the_optimum(solved: Page) -> None:
 
 def test_keys_alone_are_enough(solved: Page) -> None:
     """From the first key on: to a slider, along it, back, to a button and into a field."""
-    best = told(solved)
+    best = objective_shown(solved)
 
     def to(selector: str) -> None:
         for _ in range(80):
@@ -131,7 +131,7 @@ def test_keys_alone_are_enough(solved: Page) -> None:
         solved.keyboard.press("PageUp")
     expect(solved.locator("[data-measure=objective]")).not_to_have_text(best)
     chromium.drawn(solved)
-    worse = told(solved)
+    worse = objective_shown(solved)
     solved.keyboard.press("End")
     expect(solved.locator("[data-measure=objective]")).not_to_have_text(worse)
     solved.keyboard.press("Control+z")
@@ -164,7 +164,7 @@ def test_a_link_is_the_design(solved: Page) -> None:
     last = solved.evaluate("name => laufruheLive.page.then(page => `${name}=${page.design()[name]}`)", name)
     solved.wait_for_function("last => decodeURIComponent(location.hash).includes(last)", arg=last)
     chromium.drawn(solved)
-    link, shown = solved.url, told(solved)
+    link, shown = solved.url, objective_shown(solved)
     assert "right.unbalance" in unquote(link)
     other = solved.context.new_page()
     other.goto(link)
@@ -179,7 +179,7 @@ def test_a_link_is_the_design(solved: Page) -> None:
 def test_a_broken_link_shows_a_design_within_the_bounds(wrong: str, page: Page) -> None:
     page.goto(pages.made("solve").as_uri() + wrong)
     page.locator("[data-decision]").first.wait_for()
-    assert re.fullmatch(r"[\d.]+ N", told(page))
+    assert re.fullmatch(r"[\d.]+ N", objective_shown(page))
     assert page.evaluate("laufruheLive.page.then(page => page.design()['left.unbalance'])") <= 0.05
 
 
@@ -199,7 +199,7 @@ def test_the_saved_file_is_evaluated_alike(solved: Page, tmp_path: Path) -> None
     )
     assert answer.exit_code == 0, answer.output
     result = json.loads((tmp_path / "x.json").read_text())
-    assert figure(result["objective"]["value"], "N") == told(solved)
+    assert figure(result["objective"]["value"], "N") == objective_shown(solved)
     own = float(solved.locator("[data-measure=objective]").get_attribute("data-value") or "nan")
     assert result["objective"]["value"] == pytest.approx(own, rel=1e-11)
     row = solved.locator('tr[data-measure="balancer mass"]')

@@ -17,8 +17,8 @@ INPUTS = Path(__file__).parent / "inputs"
 def table(**engine: Any) -> dict[str, Any]:
     """Return the scene with these keys of its engine."""
     found = tomllib.loads((INPUTS / "optional-shaft-uneven-throws.toml").read_text())
-    kept = {key: value for key, value in found["engine"].items() if key not in engine}
-    return found | {"engine": kept | {key: value for key, value in engine.items() if value is not None}}
+    rest = {key: value for key, value in found["engine"].items() if key not in engine}
+    return found | {"engine": rest | {key: value for key, value in engine.items() if value is not None}}
 
 
 def with_shaft(scene: dict[str, Any]) -> dict[str, Any]:

@@ -33,8 +33,8 @@ def test_a_size_at_the_end_of_its_angles() -> None:
     """Between 41,926 N per kg m as it grows and 41,958 as it falls; the angle's bound is worth 681 N/rad."""
     text = (INPUTS / "size-at-the-end-of-its-angles.toml").read_text()
     result = laufruhe.solve(text)
-    told, here = prices(result), result.objective.value
-    size, angle = told["c.unbalance"], told["c.angle"]
+    price_of, here = prices(result), result.objective.value
+    size, angle = price_of["c.unbalance"], price_of["c.angle"]
     more, less = (value(text.replace("0.01 kg m", f"{at:.6f} kg m")) for at in (0.01001, 0.00999))
     assert (here - more) / 1e-5 == pytest.approx(41_926, rel=1e-3)
     assert size.relaxed == size.tightened == pytest.approx((less - more) / 2e-5, rel=1e-3)
@@ -86,11 +86,11 @@ def test_rows_on_a_circle(count: int) -> None:
     """Many rows of one length are told by some of them: the multiplier that balances a slope is its length."""
     turns = math.tau * np.arange(count) / count
     circle = Slopes(2.0 * np.stack([np.cos(turns), np.sin(turns)], axis=1), np.zeros((0, 2)))
-    told = prices_of([Slopes.smooth(np.array([-3.0, 4.0]))], [circle], np.zeros((0, 2)))
-    assert told is not None
+    multipliers = prices_of([Slopes.smooth(np.array([-3.0, 4.0]))], [circle], np.zeros((0, 2)))
+    assert multipliers is not None
     # balanced to a hundredth; no more of a circle than its radius pulls
-    assert told[0].relaxed == pytest.approx(2.5, rel=2e-3)
-    assert told[0].tightened == math.inf
+    assert multipliers[0].relaxed == pytest.approx(2.5, rel=2e-3)
+    assert multipliers[0].tightened == math.inf
 
 
 def random_problem(rng: np.random.Generator) -> dict[str, Any]:

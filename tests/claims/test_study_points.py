@@ -101,13 +101,13 @@ def test_a_file_that_changes_under_way_is_told_and_nothing_of_it_kept(
         thirstier(folder / FUEL)
         return solved(*words)  # type: ignore[arg-type]
 
-    study, kept = study_files.load_study(folder / STUDY), folder / "kept/points.jsonl"
+    study, points_file = study_files.load_study(folder / STUDY), folder / "kept/points.jsonl"
     with monkeypatch.context() as patched:
         patched.setattr(runner, "_answer", changed_meanwhile)
         with pytest.raises(SolverError, match="had other files") as caught:
-            runner.run(study, folder, kept)
+            runner.run(study, folder, points_file)
     assert len(str(caught.value).splitlines()) == 1
-    assert not kept.exists()
+    assert not points_file.exists()
 
 
 @pytest.mark.slow

@@ -61,13 +61,13 @@ def told_as_optimum(result: Result) -> Result:
 
 def is_withheld(result: Result, best: float) -> bool:
     """Whether a result claims nothing, says why, and has a design that is real, within its limits and not too good."""
-    problem, own, told = result.problem, result.final, result.objective
-    assert told is not None
+    problem, own, objective = result.problem, result.final, result.objective
+    assert objective is not None
     assert result.certificate is not None
     assert own.violation(problem.limits) <= 0.0
-    assert objective_value(problem, own) == pytest.approx(told.value, rel=1e-12)
-    assert told.value >= best * (1.0 - 1e-4)
-    assert repr(told.value) in result.message
+    assert objective_value(problem, own) == pytest.approx(objective.value, rel=1e-12)
+    assert objective.value >= best * (1.0 - 1e-4)
+    assert repr(objective.value) in result.message
     assert "report" in result.message
     assert "no design within" not in explained(result).lower()
     return (result.certificate.kind, result.certificate.lower_bound) == (Proof.NONE, 0.0)

@@ -15,7 +15,7 @@ from pathlib import Path
 import laufruhe
 from cli import scenes
 from problem_files import written
-from studies.kills import Told, Whole, stopped
+from studies.kills import Log, Whole, stopped
 
 
 def started(folder: Path) -> subprocess.Popen[str]:
@@ -58,7 +58,7 @@ def uninterrupted(folder: Path) -> Whole:
     return Whole(results(folder), first, time.monotonic() - began)
 
 
-def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
+def attacked(folder: Path, seed: int, whole: Whole, log: Log) -> None:
     """One problem in a new folder: solved and killed up to three times, then left alone."""
     rng = random.Random(seed)
     shutil.rmtree(folder, ignore_errors=True)
@@ -66,10 +66,10 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
     written(folder, scenes.SHAKING_ONLY)
     for _ in range(rng.randint(1, 3)):
         count = rng.choice((1, 2))
-        told.tried[f"solves, {count} at once"] += 1
-        stopped([started(folder) for _ in range(count)], rng, whole, seed, told)
+        log.tried[f"solves, {count} at once"] += 1
+        stopped([started(folder) for _ in range(count)], rng, whole, seed, log)
         if results(folder) not in ({}, whole.files):
-            told.wrong.append(f"seed {seed}: a killed solve left files of two runs, or not all of one")
+            log.wrong.append(f"seed {seed}: a killed solve left files of two runs, or not all of one")
     last = started(folder)
     said = last.communicate()[1]
     if left_behind(folder):
@@ -78,6 +78,6 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
         said += last.communicate()[1]
     left = left_behind(folder)
     if left:
-        told.wrong.append(f"seed {seed}: {', '.join(left)} left behind")
+        log.wrong.append(f"seed {seed}: {', '.join(left)} left behind")
     if last.returncode or said or results(folder) != whole.files:
-        told.wrong.append(f"seed {seed}: the last solve ended with {last.returncode}: {said[-300:]}")
+        log.wrong.append(f"seed {seed}: the last solve ended with {last.returncode}: {said[-300:]}")

@@ -316,8 +316,8 @@ def test_help_imports_no_heavy_library() -> None:
     assert "solve" in done.stdout
 
 
-@pytest.mark.parametrize(("given", "told"), [({}, ["1"] * 3), ({"OPENBLAS_NUM_THREADS": "2"}, ["2"])])
-def test_linear_algebra_of_a_command_takes_one_thread_unless_told(given: dict[str, str], told: list[str]) -> None:
+@pytest.mark.parametrize(("given", "threads"), [({}, ["1"] * 3), ({"OPENBLAS_NUM_THREADS": "2"}, ["2"])])
+def test_linear_algebra_of_a_command_takes_one_thread_unless_told(given: dict[str, str], threads: list[str]) -> None:
     """Said before NumPy reads it, by the command alone: who imports the package keeps what the environment says."""
     code = (
         "import os, sys\n"
@@ -330,7 +330,7 @@ def test_linear_algebra_of_a_command_takes_one_thread_unless_told(given: dict[st
     )
     around = {name: value for name, value in os.environ.items() if name not in ONE_THREAD} | given
     done = in_a_process(code=code, env=around)
-    assert done.stdout == f"False {list(given.values())} {told}\n", done.stderr
+    assert done.stdout == f"False {list(given.values())} {threads}\n", done.stderr
 
 
 @pytest.mark.slow

@@ -40,17 +40,17 @@ def started(folder: Path, code: str) -> subprocess.Popen[str]:
 
 
 @pytest.mark.parametrize(
-    ("code", "number", "told"),
+    ("code", "number", "message"),
     [(DEAF, signal.SIGTERM, "interrupted\n"), (ASLEEP, signal.SIGINT, "interrupted, nothing was written\n")],
 )
 def test_who_listens_ends_by_itself_and_who_does_not_is_ended(
-    code: str, number: signal.Signals, told: str, tmp_path: Path
+    code: str, number: signal.Signals, message: str, tmp_path: Path
 ) -> None:
     """Long before either would end: the one counts for days, the other sleeps for hours."""
     running = started(tmp_path, code)
     running.send_signal(number)
     out, err = running.communicate(timeout=LONG)
-    assert (running.returncode, out, err) == (130, "", f"laufruhe: {told}")
+    assert (running.returncode, out, err) == (130, "", f"laufruhe: {message}")
     assert not list(tmp_path.glob("results/[!.]*"))
     with chdir(tmp_path):
         assert CliRunner().invoke(app, ["solve", "scene.toml", "--no-plots"]).exit_code == 0

@@ -8,7 +8,7 @@ import pytest
 
 from cli import solve_kills
 from lanes import first_fast
-from studies.kills import Told, Whole
+from studies.kills import Log, Whole
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
 
 @pytest.mark.parametrize("seed", first_fast(range(4), 0, long=(0, 2, 3)))
 def test_results_are_those_of_one_run(seed: int, whole: Whole, tmp_path: Path) -> None:
-    told = Told()
-    solve_kills.attacked(tmp_path / "s", seed, whole, told)
-    assert told.wrong == []
+    log = Log()
+    solve_kills.attacked(tmp_path / "s", seed, whole, log)
+    assert log.wrong == []
     assert {".laufruhe.json", "result.json", "report.md", "cycle.svg"} <= set(whole.files)

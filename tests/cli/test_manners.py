@@ -91,10 +91,10 @@ def test_files_do_not_take_the_numbers_of_closed_streams(here: Path) -> None:
     """Keep progress out of the answer: a pipe gets neither a spinner nor colours."""
     shutil.copy(SINGLE, here / "p.toml")
     for out, streams in (("open", ""), ("closed", "-q >&- 2>&- <&-")):
-        told = shell(f"evaluate p.toml --no-plots --out {out} {streams}", here)
-        assert told.returncode == 0
-        assert "\x1b" not in told.stdout + told.stderr
-        assert bool(told.stdout) == (out == "open")
+        process = shell(f"evaluate p.toml --no-plots --out {out} {streams}", here)
+        assert process.returncode == 0
+        assert "\x1b" not in process.stdout + process.stderr
+        assert bool(process.stdout) == (out == "open")
     names = sorted(path.name for path in (here / "open").iterdir())
     assert sorted(path.name for path in (here / "closed").iterdir()) == names
     for name in (name for name in names if name.endswith(".csv")):
@@ -159,9 +159,9 @@ def test_quiet_and_verbose_contradict_each_other(here: Path) -> None:
 
 
 def test_every_command_is_told_in_a_line_that_fits() -> None:
-    told = run.invoke(app, ["--help"], env={"COLUMNS": "80"}).output.partition("Commands:")[2]
-    assert "trade" in told
-    assert "..." not in told
+    commands = run.invoke(app, ["--help"], env={"COLUMNS": "80"}).output.partition("Commands:")[2]
+    assert "trade" in commands
+    assert "..." not in commands
 
 
 def test_loudness_may_stand_before_the_command(here: Path) -> None:
@@ -196,10 +196,10 @@ def test_a_problem_may_come_from_standard_input(here: Path, words: list[str]) ->
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_shells_complete_commands_and_engines(shell: str, here: Path) -> None:
-    told = {"bash": {"COMP_WORDS": "laufruhe init --from bmw-s8", "COMP_CWORD": "3"}}.get(
+    completion_words = {"bash": {"COMP_WORDS": "laufruhe init --from bmw-s8", "COMP_CWORD": "3"}}.get(
         shell, {"_TYPER_COMPLETE_ARGS": "laufruhe init --from bmw-s8", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
     )
-    environment = {**told, "_LAUFRUHE_COMPLETE": f"complete_{shell}"}
+    environment = {**completion_words, "_LAUFRUHE_COMPLETE": f"complete_{shell}"}
     found = run.invoke(app, [], env=environment, prog_name="laufruhe").stdout
     assert "bmw-s85" in found
     assert "buick" not in found
@@ -231,11 +231,11 @@ def test_progress_shows_value_bound_and_gap_of_the_outermost_search() -> None:
 
 
 def test_searches_tell_who_listens_and_no_one_else() -> None:
-    heard: list[Step] = []
-    with progress_listener(heard.append), search_scope("outer"):
+    steps: list[Step] = []
+    with progress_listener(steps.append), search_scope("outer"):
         report_progress("inner", 1, 2, 3.0, 2.0)
     report_progress("nobody listens")
-    assert [(step.within, step.what, step.gap) for step in heard] == [(("outer",), "inner", pytest.approx(1 / 3))]
+    assert [(step.within, step.what, step.gap) for step in steps] == [(("outer",), "inner", pytest.approx(1 / 3))]
     assert math.isnan(Step((), "x").gap)
 
 
@@ -265,10 +265,10 @@ positions = [["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"], ["-300
 
 
 def test_a_star_search_tells_value_and_bound_that_enclose_the_answer(tmp_path: Path) -> None:
-    heard: list[Step] = []
-    result = solve(loaded(tmp_path, OPEN_FOUR), heard.append)
+    steps: list[Step] = []
+    result = solve(loaded(tmp_path, OPEN_FOUR), steps.append)
     assert result.objective is not None
-    valued = [step for step in heard if math.isfinite(step.value) and math.isfinite(step.bound)]
+    valued = [step for step in steps if math.isfinite(step.value) and math.isfinite(step.bound)]
     assert valued
     for step in valued:
         assert step.bound <= result.objective.value * (1.0 + 1e-4)
@@ -300,5 +300,5 @@ def test_letters_that_cannot_be_drawn_are_told_in_one_line(more: list[str], line
     env = {**os.environ, "MPLBACKEND": "junk"}
     found = subprocess.run(words, env=env, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=300)
     assert (tmp_path / "out/cycle.svg").is_file()
-    told = "laufruhe: no installed font has '\U00010600', so pictures show boxes in its place"
-    assert [line[: len(told)] for line in found.stderr.splitlines()] == lines * [told]
+    warning = "laufruhe: no installed font has '\U00010600', so pictures show boxes in its place"
+    assert [line[: len(warning)] for line in found.stderr.splitlines()] == lines * [warning]

@@ -24,8 +24,10 @@ def test_answers_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "tractor-single.toml").write_text(copies(["tractor-single"])["tractor-single.toml"], encoding="utf-8")
     text = "\n".join(re.findall(r"```pycon\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
     test = doctest.DocTestParser().get_doctest(text, {}, "reference", str(PAGE), 0)
-    told: list[str] = []
-    assert doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(test, out=told.append).failed == 0, told
+    lines: list[str] = []
+    assert doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(test, out=lines.append).failed == 0, (
+        lines
+    )
 
 
 def test_classes_are_named_without_loading_them() -> None:

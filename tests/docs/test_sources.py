@@ -26,12 +26,12 @@ def missing(place: str) -> bool:
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0][:40])
 def test_every_row_is_held_or_says_why_not(row):
     assert len(row) == 4
-    told, held = row[2:]
-    places = PLACE.findall(told + held)
+    row_text, held = row[2:]
+    places = PLACE.findall(row_text + held)
     assert [place for place in places if missing(place)] == []
-    is_hole = told.startswith("hole: ")
+    is_hole = row_text.startswith("hole: ")
     assert is_hole or any(place.startswith("tests/") for place in PLACE.findall(held))
-    assert not is_hole or len(told) > len("hole: a reason")
+    assert not is_hole or len(row_text) > len("hole: a reason")
 
 
 def test_what_is_not_there_is_found():

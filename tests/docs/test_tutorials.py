@@ -78,8 +78,8 @@ def test_commands_answer_as_the_page_says(page: Path, folder: Path) -> None:
 def test_python_answers_as_the_page_says(page: Path, folder: Path) -> None:
     text = "\n".join(blocks(page, "pycon"))
     test = doctest.DocTestParser().get_doctest(text, {}, page.stem, page.stem, 0)
-    told: list[str] = []
-    assert doctest.DocTestRunner().run(test, out=told.append).failed == 0, "".join(told)
+    failures: list[str] = []
+    assert doctest.DocTestRunner().run(test, out=failures.append).failed == 0, "".join(failures)
 
 
 def test_every_tutorial_shows_an_answer() -> None:

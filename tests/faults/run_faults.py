@@ -108,9 +108,9 @@ def page(found: dict[str, list[harness.Found]]) -> str:
     whole = sum(map(len, found.values()))
     wrong_ones = [one for of in found.values() for one in of if one.wrong]
     minutes = sum(one.seconds for of in found.values() for one in of) / 60.0
-    told = f"{whole} files in {minutes:.0f} minutes of one processor: {len(wrong_ones)} finding(s)."
+    text = f"{whole} files in {minutes:.0f} minutes of one processor: {len(wrong_ones)} finding(s)."
     listed = [f"- `{one.verb}`, seed {one.seed}: {one.wrong}" for one in wrong_ones[:50]]
-    parts = [ABOUT, f"## Figures\n\n{told}", "\n".join(rows), "\n".join(listed), FOUND, BLIND]
+    parts = [ABOUT, f"## Figures\n\n{text}", "\n".join(rows), "\n".join(listed), FOUND, BLIND]
     return "\n\n".join(part.strip() for part in parts if part) + "\n"
 
 

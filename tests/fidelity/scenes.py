@@ -85,8 +85,8 @@ def random_elastic_problem(rng: random.Random, gas: bool | None = None) -> Probl
     return replace(elastic, objective=(Term(quantity),))
 
 
-def _gas(rng: random.Random, wanted: bool | None) -> GasModel | None:
-    if wanted is False or (wanted is None and rng.random() < 0.7):
+def _gas(rng: random.Random, with_gas: bool | None) -> GasModel | None:
+    if with_gas is False or (with_gas is None and rng.random() < 0.7):
         return None
     if rng.random() < 0.5:
         return Seiliger(peak_pressure=rng.uniform(60e5, 75e5), imep=rng.uniform(6e5, 9e5))

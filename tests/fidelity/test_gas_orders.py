@@ -65,8 +65,8 @@ def test_uneven_throws_feel_the_orders_that_are_kept(monkeypatch: pytest.MonkeyP
     few, every, none = (_roll_of_star(fidelity) for fidelity in fidelities)
     assert max(order for order in every if abs(every[order]) > 1e-3 * abs(every[0.0])) > 3.0
     for order, value in few.items():
-        told = every[order] if order <= 3.0 else none.get(order, 0.0)
-        assert value == pytest.approx(told, abs=1e-9 * abs(every[0.0]))
+        expected = every[order] if order <= 3.0 else none.get(order, 0.0)
+        assert value == pytest.approx(expected, abs=1e-9 * abs(every[0.0]))
 
 
 def _roll_of_star(fidelity: Fidelity) -> dict[float, complex]:

@@ -188,11 +188,11 @@ def test_a_problem_goes_to_another_process(problem: Problem) -> None:
     assert found.fix("front web.mass", "1 kg").engine == problem.fix("front web.mass", "1 kg").engine
 
 
-@pytest.mark.parametrize(("names", "told"), [
+@pytest.mark.parametrize(("names", "rotor_names"), [
     ([None], ["s"]), (["a"], ["s.a"]), ([None, None], ["s.1", "s.2"]), (["a", None, "b"], ["s.a", "s.2", "s.b"]),
 ])  # fmt: skip
 def test_unbalances_of_a_shaft_have_one_name_wherever_they_are_asked_for(
-    names: list[str | None], told: list[str]
+    names: list[str | None], rotor_names: list[str]
 ) -> None:
     """In results and in edits."""
     tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
@@ -202,8 +202,8 @@ def test_unbalances_of_a_shaft_have_one_name_wherever_they_are_asked_for(
     del tables["constraints"]
     tables["balancer_shafts"] = [{"name": "s", "ratio": 2, "position": ["0 mm", "0 mm"], "unbalances": weights}]
     found = laufruhe.load(tables)
-    assert [rotor.name for rotor in found.engine.rotors if rotor.shaft.name == "s"] == told
-    for k, name in enumerate(told):
+    assert [rotor.name for rotor in found.engine.rotors if rotor.shaft.name == "s"] == rotor_names
+    for k, name in enumerate(rotor_names):
         other = found.with_values({f"{name}.unbalance": "0.02 kg m"})
         moved = [one.name for one in other.engine.rotors if one.shaft.name == "s" and abs(one.unbalance) > 0.015]
-        assert moved == [told[k]]
+        assert moved == [rotor_names[k]]

@@ -85,10 +85,10 @@ def test_units_and_columns_are_those_of_pressure(
 def test_a_file_that_is_no_torque_is_refused_in_one_line(
     tmp_path: Path, text: str, keys: dict[str, Any], words: str
 ) -> None:
-    with pytest.raises(InputError, match=words) as told:
+    with pytest.raises(InputError, match=words) as error:
         problem_of(tmp_path, text, **keys)
-    assert "load_torque." in str(told.value)
-    assert "pressure" not in str(told.value).replace("'pressure [bar]'", "")
+    assert "load_torque." in str(error.value)
+    assert "pressure" not in str(error.value).replace("'pressure [bar]'", "")
 
 
 @pytest.mark.parametrize("turned", [45.0, 300.0])

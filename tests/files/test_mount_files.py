@@ -106,10 +106,10 @@ REFUSED = {
 
 @pytest.mark.parametrize("case", sorted(REFUSED))
 def test_wrong_input_is_one_clear_line(case, tmp_path):
-    mounts, block, asked, expected = REFUSED[case]
+    mounts, block, objective, expected = REFUSED[case]
     engine = ENGINE.replace('"700 rpm"', '"700 rpm"\nup_to = "900 rpm"') if case == "range without steps" else ENGINE
     with pytest.raises(InputError, match=expected) as caught:
-        problem_of(tmp_path, engine, block, mounts, asked)
+        problem_of(tmp_path, engine, block, mounts, objective)
     lines = str(caught.value).splitlines()
     assert len(lines) == 1
     assert lines[0].startswith(str(tmp_path / "problem.toml"))
@@ -118,7 +118,7 @@ def test_wrong_input_is_one_clear_line(case, tmp_path):
 def test_a_band_is_kept_free_once_and_others_beside_it(tmp_path):
     bands = [f'[[constraints]]\nlimit = "natural frequencies"\noutside = ["{a} Hz", "{b} Hz"]\n' for a, b in
              ((12, 16), (20, 25), (12, 16))]  # fmt: skip
-    asked = '[objective]\nminimise = "static sag"\n'
-    assert len(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked, *bands[:2]).limits) == 2
+    objective = '[objective]\nminimise = "static sag"\n'
+    assert len(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, *bands[:2]).limits) == 2
     with pytest.raises(InputError, match=r"constraints\[3\]\.outside: limits '.*' once more, beside constraints\[1\]"):
-        problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked, *bands)
+        problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, *bands)

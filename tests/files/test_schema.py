@@ -166,8 +166,8 @@ def test_words_of_keys_are_of_keys_that_there_are() -> None:
     for is_study in (False, True):
         tables = json.loads(schema_file(is_study=is_study)[1])
         for name, table in {tables["title"]: tables, **tables["definitions"]}.items():
-            told = table.get("properties", {})
-            keys |= {*told, *(f"{name.rpartition('__')[2]}.{key}" for key in told)}
+            properties = table.get("properties", {})
+            keys |= {*properties, *(f"{name.rpartition('__')[2]}.{key}" for key in properties)}
     words = tomllib.loads(WORDS.read_text(encoding="utf-8"))
     assert not {*words["words"], *words["examples"]} - keys
 

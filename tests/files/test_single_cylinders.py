@@ -29,9 +29,9 @@ def tables(single: list[dict[str, Any]] | None = None, gas: dict[str, Any] | Non
     return {**found, "gas": GAS if gas is None else gas}
 
 
-def refusal(told: Any) -> str:
+def refusal(tables: Any) -> str:
     with pytest.raises(laufruhe.InputError) as error:
-        laufruhe.load(told)
+        laufruhe.load(tables)
     return str(error.value)
 
 
@@ -66,9 +66,9 @@ def test_distances_along_the_crank_count_from_the_front() -> None:
 
 
 def test_an_open_mass_of_one_cylinder_is_a_decision() -> None:
-    told = tables([{"cylinders": 2, "reciprocating_mass": {"between": ["0.5 kg", "0.9 kg"]}}])
-    told["objective"] = {"minimise": "rms shaking force"}
-    result = laufruhe.solve(laufruhe.load(told))
+    settings = tables([{"cylinders": 2, "reciprocating_mass": {"between": ["0.5 kg", "0.9 kg"]}}])
+    settings["objective"] = {"minimise": "rms shaking force"}
+    result = laufruhe.solve(laufruhe.load(settings))
     assert result.decisions[0].name == "reciprocating mass of cylinder 2"
     assert result.certificate is not None
     assert result.certificate.kind.value == "global"
@@ -92,9 +92,9 @@ def test_a_compressor_beside_an_engine_has_chambers_and_no_firing() -> None:
 
 
 def test_an_imep_of_an_operating_point_keeps_the_ratio_of_single_cylinders() -> None:
-    told = tables(gas={**GAS, "single_cylinders": [{"cylinders": 2, "imep": "6 bar"}]})
-    told["operating_points"][0]["imep"] = "4 bar"
-    gas = laufruhe.load(told).points[0].gas
+    settings = tables(gas={**GAS, "single_cylinders": [{"cylinders": 2, "imep": "6 bar"}]})
+    settings["operating_points"][0]["imep"] = "4 bar"
+    gas = laufruhe.load(settings).points[0].gas
     assert isinstance(gas, CylinderGases)
     assert [gas.of_cylinder(f"cylinder {k}").imep for k in (1, 2)] == pytest.approx([4e5, 3e5])  # type: ignore[union-attr]
 
@@ -134,7 +134,7 @@ def test_columns_of_pressure_count_from_their_cylinder_or_from_cylinder_1(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("told", "heard"),
+    ("settings", "message"),
     [
         (tables([{"cylinders": 7, "bore": "70 mm"}]), "is not among 4 cylinders"),
         (tables([{"cylinders": [1, 1], "bore": "70 mm"}]), "is given twice"),
@@ -148,5 +148,5 @@ def test_columns_of_pressure_count_from_their_cylinder_or_from_cylinder_1(tmp_pa
         (tables([{"cylinders": 1, "second_reciprocating_mass": "1 kg"}]), "cannot be that of a single cylinder"),
     ],
 )  # fmt: skip
-def test_a_wrong_row_is_refused_with_its_reason(told: Any, heard: str) -> None:
-    assert heard in refusal(copy.deepcopy(told))
+def test_a_wrong_row_is_refused_with_its_reason(settings: Any, message: str) -> None:
+    assert message in refusal(copy.deepcopy(settings))

@@ -62,22 +62,22 @@ def test_designs_against_masses_that_are_moved_step_by_step(name: str) -> None:
     result = _solved(name)
     point, step, phi = result.problem.points[0], 2e-3, np.linspace(0.0, 2.0 * math.tau, 49)
     around = [_masses(result, phi + k * step) for k in (-2, -1, 0, 1, 2)]
-    wanted, size = np.zeros((len(phi), 6)), 0.0
+    expected, size = np.zeros((len(phi), 6)), 0.0
     for (mass, x, a), (_, _, b), (_, _, c), (_, _, d), (_, _, e) in zip(*around, strict=True):
         velocity = point.speed * (8.0 * (d - b) - (e - a)) / (12.0 * step)
         acceleration = point.speed**2 * (16.0 * (d + b) - (e + a) - 30.0 * c) / (12.0 * step**2)
         force = -mass * acceleration
-        wanted[:, 1] += force.imag
-        wanted[:, 2] += force.real
-        wanted[:, 3] += mass * (
+        expected[:, 1] += force.imag
+        expected[:, 2] += force.real
+        expected[:, 3] += mass * (
             (np.conj(c) * acceleration).imag - (np.conj(velocity) * acceleration).real / point.speed
         )
-        wanted[:, 4] -= x * force.real
-        wanted[:, 5] += x * force.imag
+        expected[:, 4] -= x * force.real
+        expected[:, 5] += x * force.imag
         size += float(np.abs(force).max())
     found = result.final.loads[0].wrench.values(phi)
     columns = [1, 2, 4, 5] if point.gas is not None else [1, 2, 3, 4, 5]
-    np.testing.assert_allclose(found[:, columns], wanted[:, columns], atol=1e-6 * size)
+    np.testing.assert_allclose(found[:, columns], expected[:, columns], atol=1e-6 * size)
 
 
 @pytest.mark.slow

@@ -22,8 +22,8 @@ def _batch(norm: Norm, components: int) -> tuple[BatchNorm, np.ndarray]:
 @pytest.mark.parametrize("components", [1, 2, 3])
 def test_norm_of_each_design(norm: Norm, components: int) -> None:
     norms, features = _batch(norm, components)
-    wanted = [norm.value(norms.grid, np.einsum("cfk,f->kc", norms.rows, design)) for design in features]
-    np.testing.assert_allclose(norms.values(features), wanted, rtol=1e-13)
+    expected = [norm.value(norms.grid, np.einsum("cfk,f->kc", norms.rows, design)) for design in features]
+    np.testing.assert_allclose(norms.values(features), expected, rtol=1e-13)
 
 
 @pytest.mark.parametrize("components", [1, 2, 3])

@@ -18,9 +18,9 @@ def test_roundings_of_what_cancels_are_nothing_and_small_rows_stay() -> None:
     turns = moves[..., None]
     norm = StarNorm(NORMS["mean"], constant, moves, constant[..., None], turns, Grid(np.full(rows, 1.0 / rows), rows))
     found = norm.at([1, 2])
-    for told in (found.constant, found.slope[..., 0]):
-        assert not told[:, 0].any()
-        assert np.allclose(np.abs(told[:, 1]), 1e-12, rtol=1e-3, atol=0.0)
+    for part in (found.constant, found.slope[..., 0]):
+        assert not part[:, 0].any()
+        assert np.allclose(np.abs(part[:, 1]), 1e-12, rtol=1e-3, atol=0.0)
     assert np.array_equal(norm.at([0, 0]).constant, constant)
 
 

@@ -66,13 +66,13 @@ class TestPlaces:
     def test_neighbours_alone_need_a_spacing(self, layout: str, own: dict[str, object], maximum: int) -> None:
         """Cylinders of one place along the crank have no distance to a next place."""
         shared = {"cycle": "four-stroke", "stroke": "90 mm", "rod_ratio": 0.3, "reciprocating_mass": "0.5 kg"}
-        asked = {"title": "t", "operating_points": [{"speed": "3000 rpm"}]}
+        problem_keys = {"title": "t", "operating_points": [{"speed": "3000 rpm"}]}
         engine = {"layout": layout, **own, **shared, "cylinders": maximum}
-        found = laufruhe.load({**asked, "engine": engine}).engine
-        away = laufruhe.load({**asked, "engine": {**engine, "cylinder_spacing": "1 m"}}).engine
+        found = laufruhe.load({**problem_keys, "engine": engine}).engine
+        away = laufruhe.load({**problem_keys, "engine": {**engine, "cylinder_spacing": "1 m"}}).engine
         assert [part.x for part in found.cylinders] == [part.x for part in away.cylinders]
         with pytest.raises(laufruhe.InputError, match="cylinder_spacing: is missing"):
-            laufruhe.load({**asked, "engine": {**engine, "cylinders": 4, "firing_order": [1, 3, 4, 2]}})
+            laufruhe.load({**problem_keys, "engine": {**engine, "cylinders": 4, "firing_order": [1, 3, 4, 2]}})
 
     @given(st.integers(1, 48), st.floats(1e-3, 10.0))
     def test_stations(self, count: int, spacing: float) -> None:

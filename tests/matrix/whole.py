@@ -34,15 +34,15 @@ def main() -> int:
     parser.add_argument("--share", type=float, default=1.0, help="of all combinations")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", default="", help="part of a cell's name")
-    told = parser.parse_args()
-    chosen = [cell for cell in cells(told.seed) if told.only in str(cell)]
-    random.Random(told.seed).shuffle(chosen)
-    chosen = chosen[: round(told.share * len(chosen))]
+    arguments = parser.parse_args()
+    chosen = [cell for cell in cells(arguments.seed) if arguments.only in str(cell)]
+    random.Random(arguments.seed).shuffle(chosen)
+    chosen = chosen[: round(arguments.share * len(chosen))]
     shutil.rmtree(OUT, ignore_errors=True)
     OUT.mkdir(parents=True)
     ends: collections.Counter[str] = collections.Counter()
     slow: list[tuple[float, str]] = []
-    with ProcessPoolExecutor(told.jobs) as pool:
+    with ProcessPoolExecutor(arguments.jobs) as pool:
         for cell, verdict, seconds in pool.map(_one, chosen, chunksize=4):
             ends["refused" if verdict.refused else f"{verdict.status} {verdict.kind}".strip() or "error"] += 1
             slow.append((seconds, str(cell)))

@@ -40,8 +40,8 @@ class Drawn:
         self.lines = [f'title = "{family} {seed}"', *self._engine(), *self._block(), *self._mounts()]
         self.lines += self._rotors() if family == "joint" else []
         self.objective = self._objective()
-        self.asked = [self._measure(limit=True) for _ in range(int(self.rng.integers(0, 3)))]
-        self.room = [float(self.rng.choice([0.7, 0.9, 1.0, 1.02, 1.3])) for _ in self.asked]
+        self.limited_quantities = [self._measure(limit=True) for _ in range(int(self.rng.integers(0, 3)))]
+        self.room = [float(self.rng.choice([0.7, 0.9, 1.0, 1.02, 1.3])) for _ in self.limited_quantities]
 
     def text(self, limits: list[str]) -> str:
         """The file; search short."""
@@ -199,7 +199,7 @@ class Drawn:
 def limits_of(drawn: Drawn, problem: Problem) -> list[str]:
     """Limits about what the design as given has."""
     given, lines = evaluate(problem), []
-    for k, ((name, *keys), room) in enumerate(zip(drawn.asked, drawn.room, strict=True)):
+    for k, ((name, *keys), room) in enumerate(zip(drawn.limited_quantities, drawn.room, strict=True)):
         probe = load_text(drawn, [*_limit(name, keys, k), 'min = "1 Hz"' if "frequencies" in name else _probe(name)])
         values = list(given.values(probe.limits[0].measure))
         value, side = values[0] * room, "max"

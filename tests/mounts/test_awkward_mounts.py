@@ -232,9 +232,9 @@ def test_signals_of_operating_points_have_as_many_rows_each(tmp_path: Path) -> N
     engine = ENGINE.replace('stroke = "120 mm"', 'stroke = "120 mm"\nbore = "90 mm"') + "gas = false\n"
     points = engine + '[[operating_points]]\nname = "loaded"\nspeed = "900 rpm"\n'
     points += '[gas]\nmodel = "seiliger"\npeak_pressure = "50 bar"\nimep = "4 bar"\n'
-    asked = '[objective]\nminimise = "peak to peak mount travel"\n[search]\nstarts = 1\nboxes = 0\n'
-    asked += "[fidelity]\nsamples = 48\n"
-    result = solve(problem_of(tmp_path, points, BLOCK, MOUNTS, asked))
+    text = '[objective]\nminimise = "peak to peak mount travel"\n[search]\nstarts = 1\nboxes = 0\n'
+    text += "[fidelity]\nsamples = 48\n"
+    result = solve(problem_of(tmp_path, points, BLOCK, MOUNTS, text))
     assert result.objective is not None
     assert result.objective.value <= result.objective.initial
 
@@ -250,10 +250,10 @@ ratio = 2
 position = ["80 mm", "-60 mm"]
 unbalances = [{ x = "35 mm", radius = "40 mm", unbalance = { between = ["0 kg m", "0.03 kg m"] }, angle = 0 }]
 """
-    asked = '[objective]\nminimise = "maximum shaking force"\norders = [2]\n[search]\nstarts = 1\n'
+    text = '[objective]\nminimise = "maximum shaking force"\norders = [2]\n[search]\nstarts = 1\n'
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        result = solve(problem_of(tmp_path, engine, BLOCK, lossy, shaft, asked))
+        result = solve(problem_of(tmp_path, engine, BLOCK, lossy, shaft, text))
     assert result.status == "optimal"
     assert capfd.readouterr().err == ""
 
@@ -261,7 +261,7 @@ unbalances = [{ x = "35 mm", radius = "40 mm", unbalance = { between = ["0 kg m"
 @pytest.mark.parametrize("limit", ['maximum mount force"\nmax = "0 N"', 'maximum mount travel"\nmax = "0 mm"'])
 def test_a_limit_on_an_order_that_no_load_has_stands_at_zero(tmp_path: Path, limit: str) -> None:
     """Four throws in a plane have no first order: the limit is kept, and a search has nothing to hold."""
-    asked = '[objective]\nminimise = "rms mount force"\n[search]\nstarts = 1\nboxes = 0\n'
-    asked += f'[[constraints]]\norders = [1]\nlimit = "{limit}\n'
-    result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked))
+    text = '[objective]\nminimise = "rms mount force"\n[search]\nstarts = 1\nboxes = 0\n'
+    text += f'[[constraints]]\norders = [1]\nlimit = "{limit}\n'
+    result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, text))
     assert result.status.has_design

@@ -81,13 +81,13 @@ def _joint_least_squares(problem, low, high):
 
 
 @pytest.mark.parametrize(
-    ("asked", "band"),
+    ("objective", "band"),
     [("", (1e-9, 1e3)), ('frequency = "9 Hz"', (9.0, 9.0 + 1e-9)),
      ('frequency = { between = ["12 Hz", "14 Hz"] }', (12.0, 14.0))],
 )  # fmt: skip
-def test_open_stiffness_and_frequency_together_are_a_least_squares_problem(tmp_path, asked, band):
+def test_open_stiffness_and_frequency_together_are_a_least_squares_problem(tmp_path, objective, band):
     text = MOUNTS.replace('"120 N/mm", "120 N/mm"', '{ between = ["90 N/mm", "300 N/mm"] }, "120 N/mm"', 1)
-    problem = problem_of(tmp_path, ENGINE, TILTED, text, RAW + asked)
+    problem = problem_of(tmp_path, ENGINE, TILTED, text, RAW + objective)
     result = solve(problem)
     low, high = ((math.tau * f) ** 2 for f in band)
     assert result.certificate.kind is Proof.GLOBAL
@@ -97,19 +97,19 @@ def test_open_stiffness_and_frequency_together_are_a_least_squares_problem(tmp_p
 def test_a_wider_band_is_never_worse(tmp_path):
     found = []
     for low, high in ((13.0, 13.1), (12.0, 14.0), (8.0, 20.0)):
-        asked = RAW + f'frequency = {{ between = ["{low} Hz", "{high} Hz"] }}'
-        found.append(solve(problem_of(tmp_path, ENGINE, TILTED, MOUNTS, asked)).objective.value)
+        objective = RAW + f'frequency = {{ between = ["{low} Hz", "{high} Hz"] }}'
+        found.append(solve(problem_of(tmp_path, ENGINE, TILTED, MOUNTS, objective)).objective.value)
     assert found[0] >= found[1] * (1.0 - 1e-9) >= found[2] * (1.0 - 1e-9)
 
 
 @pytest.mark.parametrize(
-    "asked", [RAW, RAW + 'frequency = { between = ["6 Hz", "9 Hz"] }', SHORT, SHORT + "wanted = 0.9"]
+    "objective", [RAW, RAW + 'frequency = { between = ["6 Hz", "9 Hz"] }', SHORT, SHORT + "wanted = 0.9"]
 )
-def test_no_design_of_a_box_is_under_its_bound(tmp_path, asked):
-    problem = problem_of(tmp_path, ENGINE, TILTED, MOUNTS, asked)
+def test_no_design_of_a_box_is_under_its_bound(tmp_path, objective):
+    problem = problem_of(tmp_path, ENGINE, TILTED, MOUNTS, objective)
     measure, generator = problem.objective[0].measure, np.random.default_rng(3)
     model = BoxModel(problem, evaluate_start(problem))
-    told = 0
+    informative = 0
     for size in (1.0, 0.05, 2e-4):
         middle = model.lower + generator.random(2) * (model.upper - model.lower)
         half = 0.5 * size * (model.upper - model.lower)
@@ -118,8 +118,8 @@ def test_no_design_of_a_box_is_under_its_bound(tmp_path, asked):
         drawn = lower + generator.random((40, 2)) * (upper - lower)
         values = [evaluate(problem, problem.design(list(x))).value(measure) for x in drawn]
         assert minimum <= min(values) * (1.0 + 1e-9)
-        told += minimum > 0.5 * min(values)
-    assert told
+        informative += minimum > 0.5 * min(values)
+    assert informative
 
 
 def test_every_mode_of_modes_that_coincide_is_allowed_its_share():
@@ -134,11 +134,11 @@ def test_every_mode_of_modes_that_coincide_is_allowed_its_share():
             slopes={"stiffness": np.zeros((1, 6, 6))},
         )  # fmt: skip
         measure = SimpleNamespace(motions=("bounce",))
-        (told,) = maximum_shares(model, measure, np.ones((1, 1)), np.ones((1, 1)))
+        (shares,) = maximum_shares(model, measure, np.ones((1, 1)), np.ones((1, 1)))
         a, b = root[:, 2] @ basis, np.linalg.inv(root)[2] @ basis
         # the share of a mode in the plane of both is a quadratic form of its direction
         both = np.linalg.eigvalsh(0.5 * (np.outer(a[:2], b[:2]) + np.outer(b[:2], a[:2])))[1]
-        assert told[0] >= max(both, *(a * b)[2:]) * (1.0 - 1e-9)
+        assert shares[0] >= max(both, *(a * b)[2:]) * (1.0 - 1e-9)
 
 
 def test_a_projection_is_no_longer_than_components_allow():
@@ -146,12 +146,12 @@ def test_a_projection_is_no_longer_than_components_allow():
     r = np.random.default_rng(9)
     for size in (2.0, 0.6, 0.2):
         vector, parts = r.normal(size=(30, 6)), np.minimum(size * r.random((30, 1, 6)), 1.0)
-        told = _projection_bounds(vector, parts)[:, 0]
+        bounds = _projection_bounds(vector, parts)[:, 0]
         unit = np.sign(vector) * parts[:, 0]
         length = np.linalg.norm(unit, axis=1)
         true = np.abs(np.sum(vector * unit, axis=1)) / np.maximum(length, 1.0)
-        assert np.all(true <= told * (1.0 + 1e-12))
-        assert told[length <= 1.0] == pytest.approx(true[length <= 1.0], rel=1e-12)
+        assert np.all(true <= bounds * (1.0 + 1e-12))
+        assert bounds[length <= 1.0] == pytest.approx(true[length <= 1.0], rel=1e-12)
     assert np.all(length <= 1.0)
 
 
@@ -215,7 +215,7 @@ def test_the_shortfall_is_what_shares_lack(decoupled):
 
 
 @pytest.mark.parametrize(
-    ("asked", "told"),
+    ("objective", "message"),
     [
         ('[objective]\nminimise = "torque-roll residual"\n', "objective.frequency: is missing"),
         ('[objective]\nminimise = "torque-roll residual"\nfrequency = { between = ["6 Hz", "9 Hz"] }', "is open, and"),
@@ -225,6 +225,6 @@ def test_the_shortfall_is_what_shares_lack(decoupled):
         (SHORT + '[[constraints]]\nlimit = "decoupling shortfall"\nmin = 0.1', "cannot stand beside"),
     ],
 )
-def test_what_means_nothing_is_refused_in_a_line(tmp_path, asked, told):
-    with pytest.raises(InputError, match=told.replace(".", r"\.")):
-        problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked)
+def test_what_means_nothing_is_refused_in_a_line(tmp_path, objective, message):
+    with pytest.raises(InputError, match=message.replace(".", r"\.")):
+        problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective)

@@ -152,7 +152,7 @@ def test_a_dense_table_of_a_track_is_the_track() -> None:
 
 FLUID = 'fluid_track = { mass = "25 kg", bulge_stiffness = "260 N/mm", damping = "500 N s/m" }\n'
 HYDRAULIC = changed(MOUNTS, ('name = "front left"\n', 'name = "front left"\n' + FLUID))
-ASKED = {
+OBJECTIVES = {
     "rms": RMS,
     "mean": '[objective]\nminimise = "mean mount force"\n',
     "travel": '[objective]\nminimise = "maximum mount travel"\n',
@@ -160,9 +160,9 @@ ASKED = {
 }
 
 
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", OBJECTIVES)
 def test_bounds_know_hydraulic_mounts(name: str, tmp_path: Path) -> None:
-    problem = problem_of(tmp_path, ENGINE, BLOCK, HYDRAULIC, ASKED[name])
+    problem = problem_of(tmp_path, ENGINE, BLOCK, HYDRAULIC, OBJECTIVES[name])
     ratios = bounds_over_designs(problem)
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
@@ -213,7 +213,7 @@ def test_a_table_is_read_with_its_units(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mounts", "rows", "more", "told"),
+    ("mounts", "rows", "more", "message"),
     [
         (HYDRAULIC, ROWS, '[[constraints]]\nlimit = "natural frequencies"\nmin = "4 Hz"', "depends on frequency"),
         (HYDRAULIC, ROWS, '[[constraints]]\nlimit = "kinetic-energy decoupling"\nmin = 0.5', "depends on frequency"),
@@ -228,11 +228,11 @@ def test_a_table_is_read_with_its_units(tmp_path: Path) -> None:
          "negative loss"),
     ],
 )  # fmt: skip
-def test_what_means_nothing_is_refused_in_a_line(mounts, rows, more, told, tmp_path: Path) -> None:
+def test_what_means_nothing_is_refused_in_a_line(mounts, rows, more, message, tmp_path: Path) -> None:
     (tmp_path / "mount.csv").write_text(rows)
     with pytest.raises(InputError) as refused:
         problem_of(tmp_path, ENGINE, BLOCK, mounts, RMS, more)
-    assert told in str(refused.value)
+    assert message in str(refused.value)
 
 
 @pytest.mark.parametrize(

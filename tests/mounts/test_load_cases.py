@@ -118,7 +118,7 @@ def test_one_mount_meets_its_stop_as_two_springs_do() -> None:
     assert settled(joined, load).motion[2] == pytest.approx(-(2.5e-3 + 100.0 / 1e6), rel=1e-12)
 
 
-ASKED = {
+OBJECTIVES = {
     "travel": '[objective]\nminimise = "static travel"\n',
     "of one": '[objective]\nminimise = "static travel"\nload_cases = ["torque"]\nmounts = ["front left"]\n',
     "along z": '[objective]\nminimise = "static travel"\ndirection_weights = [0, 0, 1]\n',
@@ -139,10 +139,10 @@ GAPS = {"none": MOUNTS, "wide": with_stops("6 mm"), "narrow": with_stops("1.5 mm
 
 
 @pytest.mark.parametrize("gap", GAPS)
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", OBJECTIVES)
 def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Path) -> None:
     """Bump stops that are met all over a box, nowhere, and in a part of it (E60)."""
-    problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, ASKED[name])
+    problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, OBJECTIVES[name])
     measure, given = problem.objective[0].measure, evaluate(problem)
     model, generator, ratios = BoxModel(problem, given), np.random.default_rng(1), []
     # of loads that are held no operating point is asked
@@ -161,13 +161,13 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", ["powertrain-joined-springs", "powertrain-hydraulic"])
-@pytest.mark.parametrize("asked", ["static travel", "static mount force"])
-def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked: str) -> None:
+@pytest.mark.parametrize("quantity", ["static travel", "static mount force"])
+def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, quantity: str) -> None:
     """Boxes of every size, at random and at corners."""
     tables = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))
     tables["mounts"]["stop"] = {"gap": "4 mm", "stiffness": "1200 N/mm"}
     tables["load_cases"] = [{"name": "bump", "times_weight": [0.2, 0, -3]}, {"name": "torque", "torque": "350 N m"}]
-    tables["constraints"] = [{"limit": asked, "max": "1 m" if asked == "static travel" else "1 MN"}]
+    tables["constraints"] = [{"limit": quantity, "max": "1 m" if quantity == "static travel" else "1 MN"}]
     problem, generator, ratios = load(tables), np.random.default_rng(1), []
     given, still = evaluate(problem), evaluate(replace(problem, points=()))
     measure = problem.mount_limits[0].measure
@@ -195,10 +195,10 @@ def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
 
 
 @pytest.mark.parametrize("gap", ["none", "narrow"])
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", OBJECTIVES)
 def test_the_program_settles_where_the_block_does(name: str, gap: str, tmp_path: Path) -> None:
     """Hold the rows of the program to the length at each mount in each load case, at a balance with stops."""
-    problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, ASKED[name])
+    problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, OBJECTIVES[name])
     measure, held, mounting = problem.objective[0].measure, ConstraintCollector(), mounting_in(problem.engine)
     root, numbers = mass_root(mounting.block), ca.MX.sym("d", 2)
     cases = StaticCases(symbolic_mounts(problem, mounting.block, numbers), mounting, root, held)
@@ -208,9 +208,9 @@ def test_the_program_settles_where_the_block_does(name: str, gap: str, tmp_path:
 
     stiffness = [3e5, 9e5]
     engine = problem.design(stiffness)
-    asked = counted_cases(measure, engine)
-    found = [settled(elastic_mounting(engine.block, engine.mounts), case) for case in asked]
-    given = [settled(mounting, case).motion for case in asked]
+    load_cases = counted_cases(measure, engine)
+    found = [settled(elastic_mounting(engine.block, engine.mounts), case) for case in load_cases]
+    given = [settled(mounting, case).motion for case in load_cases]
     motions = [np.linalg.solve(root.T, each.motion) for each in found]
     sizes = [np.linalg.norm(np.linalg.solve(root.T, motion)) for motion in given]
     balances = [motion / size for motion, size in zip(motions, sizes, strict=True)] if gap != "none" else []
@@ -270,7 +270,7 @@ def test_both_are_proven_and_stops_save_stiffness(least_stiff) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cases", "more", "told"),
+    ("cases", "more", "message"),
     [
         ("", LIMIT, "needs load cases"),
         ('[[load_cases]]\nname = "nothing"\n', "", "has no load"),
@@ -280,10 +280,10 @@ def test_both_are_proven_and_stops_save_stiffness(least_stiff) -> None:
         (CASES.replace('"400 N m"', '"400 N"'), "", "torque"),
     ],
 )
-def test_what_means_nothing_is_refused_in_a_line(cases, more, told, tmp_path: Path) -> None:
+def test_what_means_nothing_is_refused_in_a_line(cases, more, message, tmp_path: Path) -> None:
     with pytest.raises(InputError) as refused:
         problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, cases, SOFT, more)
-    assert told in str(refused.value)
+    assert message in str(refused.value)
 
 
 def test_load_cases_need_mounts_that_give_way(tmp_path: Path) -> None:

@@ -53,8 +53,8 @@ def least_squares(tmp_path):
     """Torque-roll residual in box bounds alone: a bounded least-squares problem."""
     text = MOUNTS.replace('"120 N/mm", "120 N/mm"', '{ between = ["30 N/mm", "300 N/mm"] }, "120 N/mm"', 1)
     block = BLOCK + 'inertia_products = ["2 kg m^2", "-3 kg m^2", "1 kg m^2"]\n'
-    asked = '[objective]\nminimise = "torque-roll residual"\nfrequency = "9 Hz"\n'
-    return problem_of(tmp_path, ENGINE, block, text, asked)
+    objective = '[objective]\nminimise = "torque-roll residual"\nfrequency = "9 Hz"\n'
+    return problem_of(tmp_path, ENGINE, block, text, objective)
 
 
 def test_bounded_least_squares_agrees_with_scipy(tmp_path):
@@ -77,7 +77,7 @@ def test_bounded_least_squares_agrees_with_scipy(tmp_path):
 
 
 def test_least_stiff_design_agrees_with_a_search(tmp_path):
-    asked = """
+    objective = """
     [objective]
     minimise = "total stiffness"
     [[constraints]]
@@ -87,7 +87,7 @@ def test_least_stiff_design_agrees_with_a_search(tmp_path):
     limit = "natural frequencies"
     min = "4.2 Hz"
     """
-    problem = problem_of(tmp_path, ENGINE, BLOCK.replace('["0 mm", "0 mm"', '["60 mm", "0 mm"'), MOUNTS, asked)
+    problem = problem_of(tmp_path, ENGINE, BLOCK.replace('["0 mm", "0 mm"', '["60 mm", "0 mm"'), MOUNTS, objective)
     result = solve_mounts(problem)
     assert result.certificate.kind is Proof.GLOBAL
 

@@ -133,14 +133,14 @@ angle = {angle}
     assert [int(rows.sum()) for rows in held.values()] == [1, 3, 0]
     generator, inside = np.random.default_rng(3), []
     mounts = [d.start for d in problem.mount_decisions]
-    told = ca.Function("g", [program.x, program.parameters], [program.constraints])
+    constraints = ca.Function("g", [program.x, program.parameters], [program.constraints])
     for _ in range(60):
         size, angle = generator.uniform(0.0, 1.5, 2) * (0.01, 0.02), generator.uniform(-180.0, 180.0, 2)
         u = size * np.exp(1j * np.radians(angle))
         start = joint.start(mounts, np.array([u[0].real, u[0].imag, u[1].real, u[1].imag, 0.0]))
-        rows = np.asarray(told(start, 1e-3), dtype=float).ravel()
-        kept = (program.constraint_lower <= rows) & (rows <= program.constraint_upper)
-        disc, sector = (bool(kept[each].all()) for each in list(held.values())[:2])
+        rows = np.asarray(constraints(start, 1e-3), dtype=float).ravel()
+        satisfied = (program.constraint_lower <= rows) & (rows <= program.constraint_upper)
+        disc, sector = (bool(satisfied[each].all()) for each in list(held.values())[:2])
         assert disc == (size[0] <= 0.01)
         assert sector == (size[1] <= 0.02 and -20.0 <= angle[1] <= 70.0)
         inside.append((disc, sector))
@@ -200,10 +200,10 @@ class ScriptedSearch:
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "asked"), [([1e5, 1e5], 2), ([2e5 * (1.0 - 1e-8)] * 2, 1), ([3e5, 3e5], 1)],
+    ("stiffness", "count"), [([1e5, 1e5], 2), ([2e5 * (1.0 - 1e-8)] * 2, 1), ([3e5, 3e5], 1)],
     ids=["better", "as good", "worse"],
 )  # fmt: skip
-def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, tmp_path, monkeypatch):
+def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, count, tmp_path, monkeypatch):
     """Boxes that lead to a better design are divided once more, for the value that there is now."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
     values = []
@@ -219,7 +219,7 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, t
     given = search.best.design.value
     found = bound_search(problem, search, False)
     assert values[0] == pytest.approx(given, rel=1e-6)
-    assert len(values) == asked
+    assert len(values) == count
     assert values[-1] == pytest.approx(search.best.design.value, rel=1e-6)
     assert (found.bound, found.boxes) == (0.9 * values[-1], 3)
 
@@ -263,10 +263,10 @@ def test_no_neighbour_within_the_limits_is_better(solved):
         ]
         shaken = [u + size * 0.05 * complex(*generator.normal(size=2)) for u in sizes]
         near = evaluate(problem, problem.design([*shaken, *moved]))
-        kept = all(near.check_limit(limit).violation <= 1e-9 for limit in problem.mount_limits)
-        kept = kept and all(near.value(limit.measure) <= limit.maximum for limit in problem.load_limits)
-        allowed += kept
-        better += kept and objective_value(problem, near) < result.objective.value * (1 - 1e-5)
+        feasible = all(near.check_limit(limit).violation <= 1e-9 for limit in problem.mount_limits)
+        feasible = feasible and all(near.value(limit.measure) <= limit.maximum for limit in problem.load_limits)
+        allowed += feasible
+        better += feasible and objective_value(problem, near) < result.objective.value * (1 - 1e-5)
     assert allowed > 10
     assert better == 0
 
@@ -319,10 +319,10 @@ def test_limits_out_of_reach_are_not_met_and_said_so(tmp_path):
 
 @pytest.mark.slow
 def test_a_natural_frequency_is_kept_out_of_a_band(tmp_path):
-    asked = (
+    objective = (
         FORCE.format(measure="rms") + '[[constraints]]\nlimit = "natural frequencies"\noutside = ["8 Hz", "12 Hz"]\n'
     )
-    result = solve_mounts(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked, SEARCH))
+    result = solve_mounts(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, SEARCH))
     frequencies = mounting_in(result.final.engine).modes.frequencies
     # two open stiffnesses: the bounds are divided until nothing better is left
     assert result.status is Status.OPTIMAL
@@ -365,11 +365,11 @@ def test_a_limit_on_a_load_has_a_price_where_it_is_felt(tmp_path):
         limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{maximum} N"\n'
         return solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limits, SEARCH))
 
-    felt, wide = found(3.0), found(1e6)
-    assert felt.limits[0].active
-    assert felt.limits[0].value == pytest.approx(3.0, rel=1e-5)
-    assert felt.limits[0].shadow_price > 0.0
-    assert wide.objective.value < 0.9 * felt.objective.value
+    loose, wide = found(3.0), found(1e6)
+    assert loose.limits[0].active
+    assert loose.limits[0].value == pytest.approx(3.0, rel=1e-5)
+    assert loose.limits[0].shadow_price > 0.0
+    assert wide.objective.value < 0.9 * loose.objective.value
     assert wide.limits[0].shadow_price == 0.0
 
 

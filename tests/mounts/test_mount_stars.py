@@ -114,10 +114,10 @@ def test_how_stars_were_decided_is_counted(tmp_path):
 
 def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatch):
     """The first with what is worth proving of all, the others no further than it; none where one was left out."""
-    asked = []
+    calls = []
 
     def bounded(result, value, cutoff=math.inf, in_batch=False):
-        asked.append((value, cutoff, in_batch))
+        calls.append((value, cutoff, in_batch))
         bound = 0.9 * result.objective.value
         return replace(result, certificate=Certificate(Proof.GLOBAL, bound, 0.1, 0.0, "a bound"))
 
@@ -132,7 +132,7 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
     assert [star.candidate for star in out] == [star.candidate for star in found]
     assert [star.bound for star in out] == pytest.approx([0.9 * star.value for star in found])
     minimum = found[0].value
-    assert asked == [(minimum, math.inf, True), *[(minimum, 0.9 * minimum, True)] * 2]
+    assert calls == [(minimum, math.inf, True), *[(minimum, 0.9 * minimum, True)] * 2]
     assert _with_bounds(found, phasing, len(found) + 1) is found
 
 
@@ -343,8 +343,8 @@ intervals = { largest_deviation = "350 deg" }
 @pytest.mark.slow
 def test_transmissibility_tells_firing_orders_apart(tmp_path):
     """Gas is in what is transmitted, so that of twelve orders of one throw the even one is found."""
-    asked = '[objective]\nminimise = "transmissibility"\n'
-    problem = problem_of(tmp_path, RADIAL, BLOCK, ONE_OPEN, asked, UNBOUNDED)
+    objective = '[objective]\nminimise = "transmissibility"\n'
+    problem = problem_of(tmp_path, RADIAL, BLOCK, ONE_OPEN, objective, UNBOUNDED)
     assert problem.depends_on_gas
     result = solve(problem)
     assert result.objective.value <= result.objective.initial * (1.0 + 1e-9)

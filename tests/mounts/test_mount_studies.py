@@ -112,10 +112,10 @@ def test_equal_power_does_not_rebuild_a_block_on_springs(tmp_path: Path) -> None
 @pytest.mark.slow
 def test_shafts_are_sized_for_transmissibility(tmp_path: Path) -> None:
     """Without its shaft the engine still minimises what its mounts transmit, and decides their stiffness."""
-    asked = '[objective]\nminimise = "transmissibility"\norders = [2]\n'
+    objective = '[objective]\nminimise = "transmissibility"\norders = [2]\n'
     stiff = changed(MOUNTS, ('"4000 N/mm"', '"300 N/mm"'), ("400 N/mm", "200 N/mm"))
-    path = study(tmp_path, "balancer sizing", problem=SHAFT + asked)
-    (tmp_path / "soft.toml").write_text(ENGINE + BLOCK + stiff + SHAFT + asked)
+    path = study(tmp_path, "balancer sizing", problem=SHAFT + objective)
+    (tmp_path / "soft.toml").write_text(ENGINE + BLOCK + stiff + SHAFT + objective)
     data = computed(path)
     assert data["shafts"].values.tolist() == ["none", "left"]
     assert (data["objective"].values < 0.9 * data["objective_given"].values).all()
@@ -156,21 +156,21 @@ def test_studies_of_newer_mounts_have_the_loads_of_their_designs(tmp_path: Path,
     draws = study(tmp_path, "random designs", "draws = 4", problem="")
     (tmp_path / "soft.toml").write_text(ENGINE + BLOCK + mounts + problem)
     found, scene = computed(draws), load(tmp_path / "soft.toml")
-    for unbalance, told in zip(found["left.unbalance"].values[0], found["objective"].values[0], strict=True):
+    for unbalance, objective in zip(found["left.unbalance"].values[0], found["objective"].values[0], strict=True):
         design = scene.design([complex(unbalance)])
-        assert told == pytest.approx(objective_value(scene, evaluate(scene, design)), rel=1e-9)
+        assert objective == pytest.approx(objective_value(scene, evaluate(scene, design)), rel=1e-9)
     speed = scene.points[0].speed
     lines = f'speeds = {{ from = "{0.9 * speed!r} rad/s", to = "{speed!r} rad/s", points = 2 }}\n'
     draws.write_text(draws.read_text().replace("random designs", "speed map").replace("draws = 4", lines))
     (tmp_path / "kept.jsonl").unlink(missing_ok=True)
     seen = computed(draws)
     last = np.flatnonzero((seen["design"].values == "initial") & (seen["speed"].values == seen["speed"].values.max()))
-    told = float(seen["value"].values[last[0], 0])
-    assert told == pytest.approx(objective_value(scene, evaluate(scene, scene.engine)), rel=1e-5)
+    objective = float(seen["value"].values[last[0], 0])
+    assert objective == pytest.approx(objective_value(scene, evaluate(scene, scene.engine)), rel=1e-5)
 
 
 @pytest.mark.slow
 def test_explain_says_at_which_stiffness_modes_are() -> None:
-    told = CliRunner().invoke(app, ["explain", str(PROBLEMS / "powertrain-hydraulic.toml")])
-    assert told.exit_code == 0
-    assert "modes are of the stiffness at rest" in told.output
+    outcome = CliRunner().invoke(app, ["explain", str(PROBLEMS / "powertrain-hydraulic.toml")])
+    assert outcome.exit_code == 0
+    assert "modes are of the stiffness at rest" in outcome.output

@@ -42,12 +42,12 @@ def test_a_star_on_mounts_that_stay_is_proven_beside_a_limit_on_sag(tmp_path: Pa
     star = ENGINE.replace("throws = [0, 180, 180, 0]", 'throws = "open"\ncylinders = 4')
     parts = (star, BLOCK, GIVEN, CHEAPEST)
     free = solve(problem_of(tmp_path, *parts))
-    kept = solve(problem_of(tmp_path, *parts, limited("static sag", "50 mm")))
+    result = solve(problem_of(tmp_path, *parts, limited("static sag", "50 mm")))
     broken = solve(problem_of(tmp_path, *parts, limited("static sag", "0.1 mm")))
-    assert kept.certificate is not None
-    assert kept.certificate.kind is Proof.GLOBAL
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
     assert free.objective is not None
-    assert kept.objective is not None
-    assert kept.objective.value == pytest.approx(free.objective.value, rel=1e-9)
+    assert result.objective is not None
+    assert result.objective.value == pytest.approx(free.objective.value, rel=1e-9)
     assert broken.status is Status.INFEASIBLE
     assert broken.conflict == ("static sag",)

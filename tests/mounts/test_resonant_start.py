@@ -31,8 +31,8 @@ RESONANT = UNDAMPED.replace('start = "400 N/mm"', f'start = "{STRUCK!r} N/mm"')
 FORCE = '[objective]\nminimise = "rms mount force"\n[search]\nstarts = 4\n'
 
 
-def resonant(folder: Path, asked: str = FORCE, mounts: str = RESONANT) -> Problem:
-    return problem_of(folder, ENGINE, BLOCK, mounts, asked)
+def resonant(folder: Path, objective: str = FORCE, mounts: str = RESONANT) -> Problem:
+    return problem_of(folder, ENGINE, BLOCK, mounts, objective)
 
 
 def test_only_what_stands_on_the_resonance_is_infinite(tmp_path: Path) -> None:
@@ -75,8 +75,8 @@ def test_a_design_off_resonance_is_evaluated_as_ever(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_search_ends_where_it_does_from_elsewhere(tmp_path: Path) -> None:
-    asked = FORCE.replace("starts = 4", "starts = 1")
-    found, usual = solve(resonant(tmp_path, asked)), solve(resonant(tmp_path, asked, UNDAMPED))
+    objective = FORCE.replace("starts = 4", "starts = 1")
+    found, usual = solve(resonant(tmp_path, objective)), solve(resonant(tmp_path, objective, UNDAMPED))
     assert found.objective is not None
     assert usual.objective is not None
     assert found.certificate is not None

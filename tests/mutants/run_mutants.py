@@ -111,16 +111,16 @@ def write_map(arguments: argparse.Namespace) -> None:
     if MAP.exists():
         table = json.loads(MAP.read_text(encoding="utf-8"))
         files = {name.partition("::")[0] for name in calls.collected}
-        kept = [
+        known_names = [
             name
             if name not in calls.seconds
             and (name in calls.collected if (file := name.partition("::")[0]) in files else (ROOT / file).exists())
             else None
             for name, _ in table["tests"]
         ]
-        seconds.update((name, own) for name, (_, own) in zip(kept, table["tests"], strict=True) if name)
+        seconds.update((name, own) for name, (_, own) in zip(known_names, table["tests"], strict=True) if name)
         for key, own in table["functions"].items():
-            functions[key].update(name for k in own if (name := kept[k]))
+            functions[key].update(name for k in own if (name := known_names[k]))
     seconds.update(calls.seconds)
     for key, names in calls.functions.items():
         functions[key] |= names
@@ -190,8 +190,8 @@ def _forked(tests: list[str], source: Path, seconds: float) -> tuple[bool, list[
         with contextlib.suppress(BaseException):
             # libraries that are imported already are not rewritten by pytest
             quiet_options = ["-W", "ignore::pytest.PytestAssertRewriteWarning", *OPTIONS]
-            asked = [name if name.startswith("-") else str(ROOT / name) for name in tests]
-            code = int(pytest.main([*quiet_options, *asked], plugins=[Failures(log)]))
+            targets = [name if name.startswith("-") else str(ROOT / name) for name in tests]
+            code = int(pytest.main([*quiet_options, *targets], plugins=[Failures(log)]))
         os._exit(code)
     until = time.monotonic() + 120.0 + 6.0 * seconds
     while time.monotonic() < until:

@@ -20,8 +20,8 @@ class Call:
     def __init__(self, status: str, fetch: Callable[[], Any]) -> None:
         self.status, self._fetch = status, fetch
 
-    def add_done_callback(self, told: Callable[[Call], None]) -> None:
-        told(self)
+    def add_done_callback(self, callback: Callable[[Call], None]) -> None:
+        callback(self)
 
     def result(self, _: float) -> Any:
         return self._fetch()
@@ -36,14 +36,14 @@ class Client:
     status, scheduler = "running", None
 
     def __init__(self, unreachable: int) -> None:
-        self.unreachable, self.asked = unreachable, 0
+        self.unreachable, self.calls = unreachable, 0
 
     def scheduler_info(self, n_workers: int) -> dict[str, Any]:
         return {"workers": {"one": {"nthreads": abs(n_workers)}}}
 
     def submit(self, work: Callable[..., Any], *words: Any, pure: bool) -> Call:
         assert not pure
-        self.asked += 1
+        self.calls += 1
 
         def fetch() -> Any:
             raise OSError("the connection is lost")
@@ -53,11 +53,11 @@ class Client:
         except ValueError as error:
             raised = error
 
-            def told() -> Any:
+            def failing() -> Any:
                 raise raised
 
-            return Call("error", told)
-        return Call("finished", fetch if self.asked <= self.unreachable else lambda: answer)
+            return Call("error", failing)
+        return Call("finished", fetch if self.calls <= self.unreachable else lambda: answer)
 
 
 def half(number: int) -> float:
@@ -70,11 +70,11 @@ def half(number: int) -> float:
 def test_answers_that_cannot_be_fetched_are_asked_for_again() -> None:
     client = Client(unreachable=2)
     assert sorted(unordered_map(half, [2, 4, 6], Cluster(client))) == [(0, 1.0), (1, 2.0), (2, 3.0)]
-    assert client.asked == 5
+    assert client.calls == 5
 
 
 def test_what_a_call_raises_is_its_own_and_asked_for_once() -> None:
     client = Client(unreachable=0)
     with pytest.raises(ValueError, match="3 is odd"):
         list(unordered_map(half, [3], Cluster(client)))
-    assert client.asked == 1
+    assert client.calls == 1

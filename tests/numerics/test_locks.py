@@ -24,8 +24,8 @@ def test_a_folder_is_kept_by_one_at_a_time(tmp_path: Path) -> None:
 def test_a_copy_of_a_process_keeps_no_folder(tmp_path: Path) -> None:
     """A killed run whose copy lives on for a moment does not keep the next run from sweeping."""
     there, begun = os.pipe()
-    with folder_lock(tmp_path) as kept:
-        assert kept is True
+    with folder_lock(tmp_path) as locked:
+        assert locked is True
         copy = os.fork()
         if copy == 0:
             os.write(begun, b"!")

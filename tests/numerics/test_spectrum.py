@@ -122,9 +122,9 @@ class TestOrders:
     @pytest.mark.parametrize("highest", [0.0, 0.4, 0.5, 2.0, 2.49, 100.0])
     def test_kept(self, highest: float) -> None:
         s = Spectrum(Fraction(1, 2), np.arange(1, 12, dtype=complex)[:, None])
-        kept = s.truncated(highest)
-        assert kept.orders.tolist() == [order for order in s.orders if order <= highest]
-        assert kept.coefficients[:, 0].tolist() == list(range(1, len(kept.orders) + 1))
+        truncated = s.truncated(highest)
+        assert truncated.orders.tolist() == [order for order in s.orders if order <= highest]
+        assert truncated.coefficients[:, 0].tolist() == list(range(1, len(truncated.orders) + 1))
 
     @pytest.mark.parametrize(
         ("orders", "base"),

@@ -100,10 +100,10 @@ def test_who_works_may_be_asked_while_workers_begin(monkeypatch: pytest.MonkeyPa
     sys.setswitchinterval(1e-6)
     try:
         with Processes(count) as pool, ThreadPoolExecutor(1) as other:
-            asked = other.submit(lambda: [pool.submit(abs, -1) for _ in range(count)])
-            while not asked.done():
+            answer = other.submit(lambda: [pool.submit(abs, -1) for _ in range(count)])
+            while not answer.done():
                 assert len(pool.pids) <= count
-            assert [future.result() for future in asked.result()] == [None] * count
+            assert [future.result() for future in answer.result()] == [None] * count
     finally:
         sys.setswitchinterval(before)
 
@@ -204,10 +204,10 @@ def test_pieces_are_taken_as_workers_get_free() -> None:
 
 
 def test_in_turn_keeps_the_order_whoever_works() -> None:
-    told: list[int] = []
-    with ThreadPoolExecutor(3) as pool, working_on(pool), progress_listener(lambda step: told.append(step.done)):
+    steps: list[int] = []
+    with ThreadPoolExecutor(3) as pool, working_on(pool), progress_listener(lambda step: steps.append(step.done)):
         assert ordered_map(abs, [-3, -1, -2], "numbers") == [3, 1, 2]
-    assert told == [0, 1, 2]
+    assert steps == [0, 1, 2]
 
 
 def test_without_dask_the_option_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

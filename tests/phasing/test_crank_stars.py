@@ -74,10 +74,10 @@ def test_images_are_worth_the_same(star):
 def test_every_star_is_listed_once(throws, mirror, reflect):
     space = StarSpace(throws, ((1,) * throws,), places(throws), mirror, reflect)
     every = np.array([(0, *rest) for rest in itertools.permutations(range(1, throws))], dtype=np.uint8)
-    wanted = np.unique(space.canonical(every), axis=0)
+    expected = np.unique(space.canonical(every), axis=0)
     found = np.concatenate(list(space.blocks()))
     assert len(every) == space.size
-    assert sorted(map(tuple, found)) == sorted(map(tuple, wanted))
+    assert sorted(map(tuple, found)) == sorted(map(tuple, expected))
 
 
 @pytest.mark.parametrize("pattern", [(2, 2), (2, 2, 2), (2, 0, 2, 0), (1, 2, 1)])
@@ -87,11 +87,11 @@ def test_throws_side_by_side_are_listed_once(pattern):
     steps = [p for p, times in enumerate(pattern) for _ in range(times)]
     every = np.array(sorted({s for s in itertools.permutations(steps) if s[0] == 0}), dtype=np.uint8)
     assert len(every) == space.size
-    wanted = np.unique(space.canonical(every), axis=0)
+    expected = np.unique(space.canonical(every), axis=0)
     # images of a pattern with gaps may use other steps: those stay under their own pattern
     found = np.concatenate(list(space.blocks()))
-    kept = [tuple(s) for s in wanted if tuple(np.bincount(s, minlength=phases)) == pattern]
-    assert sorted(map(tuple, found)) == sorted(kept)
+    of_pattern = [tuple(s) for s in expected if tuple(np.bincount(s, minlength=phases)) == pattern]
+    assert sorted(map(tuple, found)) == sorted(of_pattern)
 
 
 def test_memory_does_not_grow_with_the_number_of_stars():

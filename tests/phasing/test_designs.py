@@ -294,9 +294,9 @@ def test_a_limit_at_its_edge_excludes_no_star(tmp_path):
     for edge in (edges[0], edges[len(edges) // 2]):
         model, _ = model_of(engines.problem(tmp_path, 5, rest=rest + limit.format(edge * (1.0 + 2e-6))))
         found = {s.star for s in search_designs(model, stars, 10**9, 1e-4).solved}
-        felt = {s.star: norm.at(s.star).value(np.zeros(norm.slope.shape[-1])) for s in best}
-        assert found >= {star for star, value in felt.items() if value <= edge}
-        assert found <= {star for star, value in felt.items() if value <= edge * (1.0 + 1e-4)}
+        couples = {s.star: norm.at(s.star).value(np.zeros(norm.slope.shape[-1])) for s in best}
+        assert found >= {star for star, value in couples.items() if value <= edge}
+        assert found <= {star for star, value in couples.items() if value <= edge * (1.0 + 1e-4)}
         assert 0 < len(found) < len(stars)
 
 
@@ -313,8 +313,8 @@ def test_angles_as_given_are_those_of_the_design_that_is_evaluated(bank, split):
     }  # fmt: skip
     result = solve(load_tables(text, Path("ten.toml")))
     name = "bank angle" if isinstance(split, int) else "split pin angle"
-    told = next(decision for decision in result.decisions if decision.name == name)
-    open_key, given = name.replace(" ", "_"), math.degrees(told.initial)
+    chosen = next(decision for decision in result.decisions if decision.name == name)
+    open_key, given = name.replace(" ", "_"), math.degrees(chosen.initial)
     engine = {**text["engine"], "throws": [math.degrees(d.initial) for d in result.decisions if "throw" in d.name]}
     again = load_tables({**text, "engine": {**engine, open_key: given}}, Path("ten.toml"))
     assert objective_value(again, evaluate(again)) == pytest.approx(result.objective.initial, rel=1e-9)

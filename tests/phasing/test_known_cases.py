@@ -54,8 +54,8 @@ def test_two_stroke_four_with_a_shaft():
     assert np.abs(wrench.at(2)[[1, 2, 4, 5]]).max() < 1e-5 * unit
     # eq. 31: the shaft's unbalances, one at either end of s = 0.5 m
     unbalance = next(d.value for d in result.decisions if d.name == "balancer.front.unbalance")
-    wanted = 0.5 * part.reciprocating_mass * part.crank_radius * 0.125 * SQRT10 / 0.5
-    assert unbalance == pytest.approx(wanted, rel=1e-5)
+    expected = 0.5 * part.reciprocating_mass * part.crank_radius * 0.125 * SQRT10 / 0.5
+    assert unbalance == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.slow

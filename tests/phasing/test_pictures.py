@@ -24,8 +24,8 @@ def test_pins_stand_where_the_throws_do(uneven):
     axes = star.figure(uneven).axes[0]
     best = uneven.phasing.ranking[0]
     pins = [patch.center for patch in axes.patches if patch.get_edgecolor() != (0.0, 0.0, 0.0, 0.0)][1:]
-    wanted = [(math.sin(angle), math.cos(angle)) for angle in best.throws]
-    for place in wanted:
+    expected = [(math.sin(angle), math.cos(angle)) for angle in best.throws]
+    for place in expected:
         assert min(math.dist(place, pin) for pin in pins) < 1e-12
 
 

@@ -83,7 +83,7 @@ def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[flo
             # inside the set of every column
             assert y[domain.columns] == pytest.approx(domain.project(y), abs=1e-15)
         x = found.matrix @ y
-        told = [domain.complex_value(x) for domain in domains_of(riders.problem.unbalances)]
+        unbalance_values = [domain.complex_value(x) for domain in domains_of(riders.problem.unbalances)]
         expected = unbalances(given.design(values))
         assert np.abs(expected).max() > 0.0
-        assert unbalances(riders.problem.design(told)) == pytest.approx(expected, abs=1e-12)
+        assert unbalances(riders.problem.design(unbalance_values)) == pytest.approx(expected, abs=1e-12)

@@ -56,11 +56,11 @@ def test_a_peak_misses_no_more_than_told(tmp_path):
     design, measure = evaluate(problem), problem.objective[0].measure
     best = SimpleNamespace(final=design, problem=problem)
     (signal,) = design.signals(measure.load)
-    told = []
+    reports = []
     for samples in (48, 96, 192):
         sizes = np.linalg.norm(signal.sample(12 * samples), axis=-1).max(axis=1)
         worst = max(sizes.max() - sizes[shift::12].max() for shift in (0, 6))
-        told.append(peak_error(measure, best, samples))
-        assert worst <= told[-1]
-    assert told[0] < 0.05 * sizes.max()
-    assert told[2] < 0.4 * told[1] < 0.16 * told[0]
+        reports.append(peak_error(measure, best, samples))
+        assert worst <= reports[-1]
+    assert reports[0] < 0.05 * sizes.max()
+    assert reports[2] < 0.4 * reports[1] < 0.16 * reports[0]

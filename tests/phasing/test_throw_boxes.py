@@ -190,7 +190,7 @@ def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
     windows, firing = windows_of(problem, phasing), firing_bounds(phasing)
     own = phasing.layout(*phasing.minimum_geometry)
     rng = np.random.default_rng(4)
-    kept = 0
+    in_window = 0
     for trial in range(400):
         throws = rng.uniform(0.0, math.tau, len(own.throw_positions))
         if trial % 2:
@@ -208,8 +208,8 @@ def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
                 same = window.order == order and np.allclose(matrix @ turned + constants, intervals, atol=1e-6)
                 holding += bool(same and np.all(turned <= high + 1e-6))
             assert holding == int(phasing.intervals.holds(intervals)), (order, intervals)
-            kept += holding
-    assert kept > 50
+            in_window += holding
+    assert in_window > 50
 
 
 @pytest.mark.parametrize("beside", [0, 1, 2])

@@ -117,16 +117,16 @@ def test_prices_are_those_of_an_end_as_good_as_the_best_crank(tmp_path, monkeypa
     order = tuple(int(k) + 1 for k in np.argsort([-angle % math.tau for angle in throws]))
     start, none, better = Candidate(throws, order), np.zeros(0), []
     for side in (-0.05, 0.0, 0.05):
-        asked = []
+        calls = []
 
         def ended(program, starts, side=side, **_):
             x = starts[0] + side * (starts[1] - starts[0])
             return [LocalOptimum(x, 1.0, none, none, 0.0, 0.0, 1, 0.0, Ending.CONVERGED, 0)]
 
         monkeypatch.setattr(uneven_throws, "solve_nonlinear", ended)
-        monkeypatch.setattr(SmoothProgram, "prices", lambda *_, asked=asked: asked.append(1) or {})
+        monkeypatch.setattr(SmoothProgram, "prices", lambda *_, calls=calls: calls.append(1) or {})
         better.append(local_optimum(phasing, start, phasing.intervals).candidate != start)
-        assert bool(asked) is (better[-1] or side == 0.0)
+        assert bool(calls) is (better[-1] or side == 0.0)
     assert sorted(better) == [False, False, True]
 
 

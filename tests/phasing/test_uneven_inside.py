@@ -57,7 +57,7 @@ LOADS = (
 )  # fmt: skip
 
 
-def problem_of(engine: dict[str, Any], quantity: str, throws: int = 3, **told: Any) -> Problem:
+def problem_of(engine: dict[str, Any], quantity: str, throws: int = 3, **changes: Any) -> Problem:
     """An engine with a bearing on either side of every throw; a key of `told` that is None is left out."""
     half = 62.5 * throws
     bare = {key: value for key, value in THREE["engine"].items() if key not in ("firing_order", "throws")}
@@ -72,7 +72,7 @@ def problem_of(engine: dict[str, Any], quantity: str, throws: int = 3, **told: A
     ]
     if throws > 1:
         whole["torsion"] = TORSION
-    return load_tables({k: v for k, v in (whole | told).items() if v is not None}, Path("inside.toml"))
+    return load_tables({k: v for k, v in (whole | changes).items() if v is not None}, Path("inside.toml"))
 
 
 SCENES = {
@@ -90,8 +90,8 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     """Throws, bank, split pin and weight drawn at random; every order kept."""
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 1e-9)
     monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
-    engine, throws, told = SCENES[name]
-    problem = problem_of(engine, "rms main-bearing force", throws, **told)
+    engine, throws, settings = SCENES[name]
+    problem = problem_of(engine, "rms main-bearing force", throws, **settings)
     phasing = problem.phasing
     start = start_candidates(phasing, None, True)[0]
     own = replace(phasing.problem_of(start), phasing=None)
@@ -128,8 +128,8 @@ def test_waves_of_throws_are_those_of_the_exact_model() -> None:
         norm = waves.norm(measure, waves.samples(measure, 192))
         window = windows[rng.integers(len(windows))]
         throws = nearest_throws(window, rng.uniform(*window.box))
-        told = tuple(float(angle) % math.tau for angle in throws)
-        moved = replace(phasing.problem_of(replace(start, throws=told, firing_order=window.order)), phasing=None)
+        angles = tuple(float(angle) % math.tau for angle in throws)
+        moved = replace(phasing.problem_of(replace(start, throws=angles, firing_order=window.order)), phasing=None)
         rows = norm.fixed.constant.copy()
         for part, wave in zip(waves.parts, norm.waves, strict=True):
             lap = 0 if part.cylinder is None else window.laps[part.cylinder]
@@ -153,8 +153,8 @@ DECIDED = {
 @cache
 def decided(quantity: str) -> tuple[Problem, Result]:
     """Throws between bounds; beside loads of bearings a weight."""
-    told = DECIDED[quantity] | ({} if "bearing" in quantity else {"counterweights": None})
-    problem = problem_of(BETWEEN | ({"cycle": "two-stroke"} if "twist" in quantity else {}), quantity, **told)
+    settings = DECIDED[quantity] | ({} if "bearing" in quantity else {"counterweights": None})
+    problem = problem_of(BETWEEN | ({"cycle": "two-stroke"} if "twist" in quantity else {}), quantity, **settings)
     return problem, laufruhe.solve(problem)
 
 
@@ -220,7 +220,7 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
             minimum = min(minimum, objective_value(own, found))
     assert result.certificate.lower_bound <= minimum * (1.0 + 1e-5)
     assert result.objective.value <= minimum * (1.0 + 1e-4)
-    told = laufruhe.solve(
+    limited = laufruhe.solve(
         problem_of(
             BETWEEN,
             "rms main-bearing force",
@@ -229,7 +229,7 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
             fidelity=COARSE,
         )
     )
-    assert told.status is Status.FAILED
+    assert limited.status is Status.FAILED
 
 
 ELASTIC: dict[str, Any] = {
@@ -251,12 +251,12 @@ BOTH = {"terms": [{"quantity": "mean main-bearing force", "weight": 0.1}, {"quan
 @pytest.mark.slow
 def test_firing_orders_beside_a_spring_that_is_open() -> None:
     """Bearings, twist and mounts in one sum: every order at every stiffness of a grid is worse than the bound."""
-    told = ELASTIC | {"counterweights": None, "objective": BOTH}
+    settings = ELASTIC | {"counterweights": None, "objective": BOTH}
     crank = {"throws": "open", "firing_order": "open", "cylinders": 3}
-    result = laufruhe.solve(problem_of(crank, "", **told))
+    result = laufruhe.solve(problem_of(crank, "", **settings))
     values = []
     for order in ([1, 2, 3], [1, 3, 2]):
-        fixed = problem_of({"firing_order": order}, "", **told)
+        fixed = problem_of({"firing_order": order}, "", **settings)
         decision = fixed.mount_decisions[0]
         for stiffness in np.linspace(decision.lower, decision.upper, 11):
             own = evaluate(fixed, fixed.design([float(stiffness)], [decision]))
@@ -270,9 +270,9 @@ def test_firing_orders_beside_a_spring_that_is_open() -> None:
 @pytest.mark.slow
 def test_throws_that_move_beside_a_spring_that_is_open() -> None:
     """No worse than any throw and stiffness of a grid by more than the tolerance of a local search."""
-    told = ELASTIC | {"counterweights": None, "objective": BOTH}
+    settings = ELASTIC | {"counterweights": None, "objective": BOTH}
     crank = {"throws": [0, {"between": [100, 140]}, 240], "firing_order": [1, 3, 2]}
-    problem = problem_of(crank, "", **told)
+    problem = problem_of(crank, "", **settings)
     result = laufruhe.solve(problem)
     assert result.status is Status.FEASIBLE
     values = []
@@ -287,7 +287,7 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
     assert result.objective.value <= min(values) * (1.0 + 1e-4)
     assert result.certificate.lower_bound <= min(values)
     even = [{"quantity": "degree of irregularity", "weight": 1e4}, {"quantity": "rms mount force"}]
-    both = problem_of(crank, "", **told | {"objective": {"terms": even}})
+    both = problem_of(crank, "", **settings | {"objective": {"terms": even}})
     turned, values = searched(both), []
     for angle, stiffness in itertools.product(np.radians([100, 110, 120, 130, 140]), (0.0, 0.5, 1.0)):
         own = both.phasing.problem_of(replace(start, throws=(0.0, float(angle), start.throws[2])))

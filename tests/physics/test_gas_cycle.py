@@ -137,8 +137,8 @@ class TestSeiliger:
         gas = Seiliger(
             90 * BAR, 0.0, *exponents, compression_ratio=14.0, intake_pressure=1.4 * BAR, exhaust_pressure=1.1 * BAR
         )
-        wanted = _seiliger_loop(gas, cycle, cut_off)
-        assert seiliger_imep(gas, cycle, cut_off) == pytest.approx(wanted, rel=1e-13, abs=1e-13 * gas.peak_pressure)
+        expected = _seiliger_loop(gas, cycle, cut_off)
+        assert seiliger_imep(gas, cycle, cut_off) == pytest.approx(expected, rel=1e-13, abs=1e-13 * gas.peak_pressure)
 
     @given(
         share=st.floats(0.0, 1.0),
@@ -311,9 +311,9 @@ class TestWiebe:
     )
     def test_against_integration(self, gas: Wiebe, part: SliderCrank) -> None:
         angles = np.linspace(-2.8, 2.8, 117)
-        wanted = _integrated(gas, part, wiebe_heat(gas, part, Cycle.TWO_STROKE), angles)
+        expected = _integrated(gas, part, wiebe_heat(gas, part, Cycle.TWO_STROKE), angles)
         found = wiebe_pressure(gas, part, Cycle.TWO_STROKE, angles)
-        np.testing.assert_allclose(found, wanted, rtol=1e-9)
+        np.testing.assert_allclose(found, expected, rtol=1e-9)
 
     @every_part
     @every_cycle
@@ -389,13 +389,13 @@ class TestTrace:
     def test_fine_trace_gives_back_what_it_was_taken_from(self, part: SliderCrank, cycle: Cycle, first: float) -> None:
         angles = first + np.linspace(0.0, cycle.angle, 3600 * cycle.turns, endpoint=False)
         trace = PressureTrace(tuple(angles), tuple(seiliger_pressure(DIESEL, part, cycle, angles)))
-        wanted, found = (cylinder_pressure(gas, part, cycle, 1440) for gas in (DIESEL, trace))
+        expected, found = (cylinder_pressure(gas, part, cycle, 1440) for gas in (DIESEL, trace))
         away = np.ones(1440, dtype=bool)
         for centre in dead_centres(part):
             gap = np.mod(cycle.angle * np.arange(1440) / 1440 - centre + 0.5, math.pi) - 0.5
             away &= np.abs(gap) > 0.01
         assert away.sum() > 1400
-        np.testing.assert_allclose(found[away], wanted[away], rtol=1e-3)
+        np.testing.assert_allclose(found[away], expected[away], rtol=1e-3)
         assert indicated_mean_pressure(found, part, cycle) == pytest.approx(9 * AT, rel=2e-4)
 
     def test_passes_through_its_points_and_closes(self) -> None:

@@ -276,6 +276,6 @@ def test_two_orders_reach_the_torque() -> None:
     assert errors[0] > 0.01
     assert errors[1] == pytest.approx(errors[0] / 16.0, rel=0.3)
     assert errors[2] == pytest.approx(errors[1] / 16.0, rel=0.1)
-    asked = problem.changed(objective=(Term(Measure(*MEASURES["rms crank torque"])),), decisions=(), limits=())
-    scale = Reference(asked, reference(asked))
+    of_torque = problem.changed(objective=(Term(Measure(*MEASURES["rms crank torque"])),), decisions=(), limits=())
+    scale = Reference(of_torque, reference(of_torque))
     assert 1e-3 < scale.relative_change(Fidelity("two-order", 720)) < 0.2

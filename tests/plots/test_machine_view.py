@@ -68,8 +68,8 @@ def test_leads_masses_and_sizes_that_are_open_are_marked(name: str, cranks: int,
     view = EngineView.from_result(result)
     assert (len(view.cranks), len(view.pistons), view.rods) == (cranks, pistons, rods)
     labels = {text.get_text() for text in engine.figure(result).legends[0].get_texts()}
-    told = {"crank, open": cranks, "piston, open": pistons, "rod, open": rods}
-    assert {label for label, count in told.items() if count} == labels & set(told)
+    counts = {"crank, open": cranks, "piston, open": pistons, "rod, open": rods}
+    assert {label for label, count in counts.items() if count} == labels & set(counts)
 
 
 @pytest.mark.parametrize(

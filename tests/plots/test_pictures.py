@@ -42,7 +42,7 @@ def size_of(path: Path) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize(
-    ("text", "wanted"),
+    ("text", "expected"),
     [
         (scenes.TIGHT, ["engine", "polar", "ellipses", "cycle", "bars", "spectrum"]),
         (scenes.TWO_POINTS, ["engine", "polar", "cycle", "bars", "spectrum"]),
@@ -50,8 +50,8 @@ def size_of(path: Path) -> tuple[int, int]:
         (scenes.SHAKING_ONLY, ["engine", "ellipses", "cycle", "spectrum"]),
     ],
 )
-def test_a_result_fills_pictures(text: str, wanted: list[str]) -> None:
-    assert names(scenes.solved(text)) == wanted
+def test_a_result_fills_pictures(text: str, expected: list[str]) -> None:
+    assert names(scenes.solved(text)) == expected
 
 
 def test_pictures_are_whole(tmp_path: Path) -> None:
@@ -96,13 +96,15 @@ def test_the_ring_stands_where_the_first_cylinder_fires() -> None:
 def test_what_hardly_moves_is_shown_without_its_steady_part() -> None:
     angles = np.linspace(0.0, math.tau, 181)
     path = np.stack([0.0 * angles, 3.0 * np.cos(angles), 200.0 + np.sin(angles)], axis=-1)[:, None, :]
-    (moved,), told = polar._moving([path])
-    assert "steady" in told
+    (moved,), note = polar._moving([path])
+    assert "steady" in note
     assert moved[:-1].mean(axis=0) == pytest.approx(0.0, abs=1e-12)
     assert np.ptp(moved, axis=0) == pytest.approx(np.ptp(path, axis=0))
-    (kept,), told = polar._moving([0.02 * path + np.stack([0.0 * path[..., 0], path[..., 1], 0.0 * path[..., 0]], -1)])
-    assert told == ""
-    assert kept[0, 0, 2] == pytest.approx(4.0)
+    (shifted,), note = polar._moving(
+        [0.02 * path + np.stack([0.0 * path[..., 0], path[..., 1], 0.0 * path[..., 0]], -1)]
+    )
+    assert note == ""
+    assert shifted[0, 0, 2] == pytest.approx(4.0)
 
 
 def test_polar_diagrams_share_one_scale() -> None:
@@ -197,8 +199,8 @@ def test_a_cycle_shows_loads_and_mount_forces_angle_by_angle() -> None:
         for k, component in ((0, 2), (1, 3)):
             line = next(line for line in axes[k].lines if line.get_color() == colour)
             scale = 1e-3 if "[k" in axes[k].get_ylabel() else 1.0
-            wanted = loads.wrench.values(np.radians(line.get_xdata()))[:, component]
-            assert np.allclose(line.get_ydata(), scale * wanted, rtol=1e-12, atol=1e-9)
+            expected = loads.wrench.values(np.radians(line.get_xdata()))[:, component]
+            assert np.allclose(line.get_ydata(), scale * expected, rtol=1e-12, atol=1e-9)
         for m in range(4):
             line = next(line for line in axes[2 + m].lines if line.get_color() == colour)
             assert line.get_xdata()[-1] == 720.0

@@ -154,9 +154,9 @@ def _entries(paths: Sequence[Path], rounds: int) -> Iterator[tuple[str, Channel,
                 for channel in CHANNELS.values():
                     at = [_numbers(channel, evaluation) for evaluation in evaluations]
                     if all(each is not None and np.all(np.isfinite(each)) for each in at):
-                        told = [each for each in at if each is not None]
-                        if len({len(each) for each in told}) == 1:
-                            yield path.stem, channel, kind, dependence(channel, kind, own), told
+                        values = [each for each in at if each is not None]
+                        if len({len(each) for each in values}) == 1:
+                            yield path.stem, channel, kind, dependence(channel, kind, own), values
 
 
 def _check(paths: Sequence[Path], rounds: int) -> set[tuple[str, Kind]]:
@@ -237,11 +237,11 @@ def test_leads_shift_what_each_shaft_carries() -> None:
                 if dependence(channel, Kind.LEAD, own) is not Dependence.SHIFT or not isinstance(channel, LoadChannel):
                     continue
                 try:
-                    told = [evaluation.signals(channel) for evaluation in at]
+                    series = [evaluation.signals(channel) for evaluation in at]
                 except (TypeError, ValueError):
                     # the engine has no such places
                     continue
-                for signals in zip(*told, strict=True):
+                for signals in zip(*series, strict=True):
                     base = min(signal.base for signal in signals)
                     first, second, third = (signal.with_base(base).series.coefficients for signal in signals)
                     size = float(np.abs(first).max(initial=0.0))
@@ -261,11 +261,11 @@ def test_no_star_moves_what_is_constant() -> None:
         stars = [star for star, _ in even_stars(problem.phasing)][:2]
         at = [evaluate(whole := problem.phasing.problem_of(star), whole.engine) for star in stars]
         for channel in CHANNELS.values():
-            told = [_numbers(channel, evaluation) for evaluation in at]
-            if len(told) > 1 and dependence(channel, Kind.STAR, problem) is Dependence.NONE:
-                for each in told:
-                    if each is not None and told[0] is not None:
-                        np.testing.assert_allclose(each, told[0], rtol=1e-9)
+            values = [_numbers(channel, evaluation) for evaluation in at]
+            if len(values) > 1 and dependence(channel, Kind.STAR, problem) is Dependence.NONE:
+                for each in values:
+                    if each is not None and values[0] is not None:
+                        np.testing.assert_allclose(each, values[0], rtol=1e-9)
                         seen.add(channel.name)
     assert seen
 

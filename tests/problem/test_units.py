@@ -243,21 +243,21 @@ class TestParse:
         """As engineers write them; a registry may take them for a count of yarn."""
         assert parse("120 Nm", "N m") == 120.0
 
-    @pytest.mark.parametrize("wanted", COMMON)
-    def test_common_units_are_those_of_the_registry(self, wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    @pytest.mark.parametrize("expected", COMMON)
+    def test_common_units_are_those_of_the_registry(self, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
         """What is known without it, to the last bit; and what it does not take for this dimension, they do not."""
         common = dict(COMMON)
         monkeypatch.setattr(module, "COMMON", {})
         for unit in {unit for row in common.values() for unit in row}:
             try:
-                known = module._factor.__wrapped__(unit, wanted)
+                known = module._factor.__wrapped__(unit, expected)
             except UnitError:
                 known = None
-            assert common[wanted].get(unit) == known, unit
+            assert common[expected].get(unit) == known, unit
 
     def test_the_dimension_of_a_common_unit_needs_no_registry(self, monkeypatch: pytest.MonkeyPatch) -> None:
         dimensions = {unit: dimension_of(f"1 {unit}") for row in COMMON.values() for unit in row}
-        assert all(unit in COMMON[wanted] for unit, wanted in dimensions.items())
+        assert all(unit in COMMON[expected] for unit, expected in dimensions.items())
         monkeypatch.setattr(module, "_registry", None)
         module._factor.cache_clear()
         assert dimensions == {unit: dimension_of(f"1 {unit}") for unit in dimensions}

@@ -28,24 +28,24 @@ def scene(seed: int, ranks: tuple[int, ...], damped: float = 0.1) -> dict[str, n
 def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...], wide: float) -> None:
     rng, tight, ended = np.random.default_rng(7), 0.0, 0
     for seed in range(20):
-        told = scene(seed, ranks)
+        parts = scene(seed, ranks)
         halves = wide * rng.random((1, len(ranks)))
         sides = directions_of(
-            [[side.real, side.imag, end.real] for side, end in zip(told["sides"], told["ends"], strict=True)]
+            [[side.real, side.imag, end.real] for side, end in zip(parts["sides"], parts["ends"], strict=True)]
         )
         assert np.bincount(sides.number_of_column).tolist() == list(ranks)
-        inverse = np.linalg.inv(told["middle"])
-        motion = np.einsum("kij,kj->ki", inverse, told["loads"])
-        at = series(halves, halves, inverse[None], sides, sides.inside(told["sides"]), motion[None])
-        turned = sides.along(told["ends"]) * halves[0, sides.number_of_column]
-        answer = mapped(at, told["value"][None], turned)
+        inverse = np.linalg.inv(parts["middle"])
+        motion = np.einsum("kij,kj->ki", inverse, parts["loads"])
+        at = series(halves, halves, inverse[None], sides, sides.inside(parts["sides"]), motion[None])
+        turned = sides.along(parts["ends"]) * halves[0, sides.number_of_column]
+        answer = mapped(at, parts["value"][None], turned)
         ended += int(np.isfinite(answer.remainder).sum())
         corners = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(ranks))).reshape(len(ranks), -1).T
         for s in [*corners, *rng.uniform(-1.0, 1.0, (20, len(ranks)))]:
             moved = np.linalg.solve(
-                told["middle"] + np.einsum("n,nij->ij", s * halves[0], told["sides"]), told["loads"][:, :, None]
+                parts["middle"] + np.einsum("n,nij->ij", s * halves[0], parts["sides"]), parts["loads"][:, :, None]
             )[..., 0]
-            maps = told["value"] + np.einsum("n,nri->ri", s * halves[0], told["ends"])
+            maps = parts["value"] + np.einsum("n,nri->ri", s * halves[0], parts["ends"])
             off = np.einsum("kri,ki->kr", maps, moved) - answer.value[0] - np.einsum("n,knr->kr", s, answer.slopes[0])
             size = np.linalg.norm(off, axis=-1)
             assert np.all(size <= answer.remainder[0] * (1.0 + 1e-9) + 1e-12)
@@ -55,23 +55,23 @@ def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...],
 
 
 def test_a_map_that_sees_nothing_has_no_rest_however_far_motion_goes() -> None:
-    told = scene(3, (1, 1))
-    sides, wide = directions_of([[side.real] for side in told["sides"]]), np.full((1, 2), 50.0)
-    inverse = np.linalg.inv(told["middle"])
-    motion = np.einsum("kij,kj->ki", inverse, told["loads"])
-    at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
+    maps = scene(3, (1, 1))
+    sides, wide = directions_of([[side.real] for side in maps["sides"]]), np.full((1, 2), 50.0)
+    inverse = np.linalg.inv(maps["middle"])
+    motion = np.einsum("kij,kj->ki", inverse, maps["loads"])
+    at = series(wide, wide, inverse[None], sides, sides.inside(maps["sides"]), motion[None])
     assert np.all(np.isinf(at.remainder))
-    assert np.all(mapped(at, 0.0 * told["value"][None]).remainder == 0.0)
-    assert np.all(np.isinf(mapped(at, told["value"][None]).remainder))
+    assert np.all(mapped(at, 0.0 * maps["value"][None]).remainder == 0.0)
+    assert np.all(np.isinf(mapped(at, maps["value"][None]).remainder))
 
 
 def test_a_number_of_no_width_moves_nothing() -> None:
-    told = scene(5, (2, 1))
-    sides, wide = directions_of([[side.real] for side in told["sides"]]), np.array([[0.05, 0.0]])
-    inverse = np.linalg.inv(told["middle"])
-    motion = np.einsum("kij,kj->ki", inverse, told["loads"])
-    at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
-    answer = mapped(at, told["value"][None], sides.along(told["ends"]) * wide[0, sides.number_of_column])
+    maps = scene(5, (2, 1))
+    sides, wide = directions_of([[side.real] for side in maps["sides"]]), np.array([[0.05, 0.0]])
+    inverse = np.linalg.inv(maps["middle"])
+    motion = np.einsum("kij,kj->ki", inverse, maps["loads"])
+    at = series(wide, wide, inverse[None], sides, sides.inside(maps["sides"]), motion[None])
+    answer = mapped(at, maps["value"][None], sides.along(maps["ends"]) * wide[0, sides.number_of_column])
     assert np.all(answer.slopes[0, :, 1] == 0.0)
     assert np.all(answer.scores[0, :, 1] == 0.0)
     assert np.all(answer.scores[0, :, 0] > 0.0)

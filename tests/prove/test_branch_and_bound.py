@@ -93,8 +93,8 @@ def test_places_told_are_the_middles_of_the_least_boxes_left() -> None:
     found = bisect_box(Distance(), np.array([1.0, 5.0]), np.array([4.0, 9.0]), 1.05, 0.0, 60)
     assert found.bound == 1.0
     assert found.places
-    for told in found.places:
-        assert np.abs(told - place).max() < 1.5
+    for middle in found.places:
+        assert np.abs(middle - place).max() < 1.5
 
 
 def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
@@ -109,12 +109,12 @@ def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
 
 
 def test_who_listens_hears_bounds_that_rise_under_the_best_value() -> None:
-    heard: list[Step] = []
+    steps: list[Step] = []
     search = Least(np.random.default_rng(1).normal(size=64))
-    with progress_listener(heard.append):
+    with progress_listener(steps.append):
         search.divide(search.bound((0, 64)), 1000)
-    assert [step.bound for step in heard] == sorted(step.bound for step in heard)
-    assert all(step.bound <= step.value for step in heard)
+    assert [step.bound for step in steps] == sorted(step.bound for step in steps)
+    assert all(step.bound <= step.value for step in steps)
 
 
 class Bowl:

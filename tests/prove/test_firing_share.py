@@ -20,9 +20,9 @@ from problem_files import PROBLEMS
 
 
 def problem(name: str, quantity: str = "mean mount force", **engine: Any) -> Problem:
-    told = tomllib.loads((PROBLEMS / f"compare-{name}.toml").read_text(encoding="utf-8"))
-    told["engine"] |= engine
-    return load_tables({**told, "objective": {"minimise": quantity}}, Path("star.toml"))
+    tables = tomllib.loads((PROBLEMS / f"compare-{name}.toml").read_text(encoding="utf-8"))
+    tables["engine"] |= engine
+    return load_tables({**tables, "objective": {"minimise": quantity}}, Path("star.toml"))
 
 
 CASES = [

@@ -51,7 +51,7 @@ def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
 
 def test_limits_that_are_kept_are_no_conflict_of_those_that_are_not(tmp_path: Path) -> None:
     """A limit on forces that no search meets says nothing of sag, which all designs keep."""
-    asked = """
+    text = """
     [search]
     starts = 1
     [[counterweights]]
@@ -67,6 +67,6 @@ def test_limits_that_are_kept_are_no_conflict_of_those_that_are_not(tmp_path: Pa
     limit = "maximum mount force"
     max = "1e-3 N"
     """
-    result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked))
+    result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, text))
     assert result.status is Status.FAILED
     assert result.conflict == ()

@@ -37,12 +37,12 @@ def test_each_has_its_turn_until_one_closes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """A value of 1 is closed from 0.9, and the best bound is the answer."""
-    asked = []
+    calls = []
 
     def bounds_of(name: str, answers: list[tuple[float, int]]):
         def bounds(question: Question) -> Iterator[BoxResult]:
             for answer in answers:
-                asked.append((name, question.bound))
+                calls.append((name, question.bound))
                 yield BoxResult(*answer, PLACE)
 
         return Prover(name, lambda _: True, bounds)
@@ -51,15 +51,15 @@ def test_each_has_its_turn_until_one_closes(
     monkeypatch.setattr(provers, "provers", lambda: (never, bounds_of("f", first), bounds_of("s", second)))
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
     found = run_provers(Question(problem, 1.0, 0.1))
-    assert (found.bound, found.boxes, "".join(name for name, _ in asked)) == (bound, boxes, order)
+    assert (found.bound, found.boxes, "".join(name for name, _ in calls)) == (bound, boxes, order)
     assert bool(found.places) is bool(order)
     # each knows the best bound before its own
-    told = [0.0, *(answer[0] for answer in (first + second))]
-    assert all(known in told for _, known in asked)
+    known_bounds = [0.0, *(answer[0] for answer in (first + second))]
+    assert all(known in known_bounds for _, known in calls)
     with limit_time(1e-9):
-        asked.clear()
+        calls.clear()
         run_provers(Question(problem, 1.0, 0.1))
-        assert "".join(name for name, _ in asked) == order[:1]
+        assert "".join(name for name, _ in calls) == order[:1]
 
 
 @pytest.mark.slow

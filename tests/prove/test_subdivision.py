@@ -52,7 +52,7 @@ def divided_bound(problem: Problem, value: float, room: float, known: Witness | 
     return next(stiffness_bounds(problem, value, room, (1.0,), known), BoxResult(0.0, 0))
 
 
-ASKED = {
+OBJECTIVES = {
     "rms": 'minimise = "rms mount force"',
     "mean": 'minimise = "mean mount force"',
     "maximum": 'minimise = "maximum mount force"',
@@ -90,9 +90,9 @@ def boxes(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarr
     return np.clip(centres - widths, low, high), np.clip(centres + widths, low, high)
 
 
-@pytest.mark.parametrize("name", first_fast(ASKED, 2))
+@pytest.mark.parametrize("name", first_fast(OBJECTIVES, 2))
 def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, ASKED[name])
+    problem = asked_for(tmp_path, OBJECTIVES[name])
     assert is_stiffness_problem(problem)
     given = evaluate(problem)
     search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, given))
@@ -113,7 +113,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
 
 
 def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, ASKED["mean"])
+    problem = asked_for(tmp_path, OBJECTIVES["mean"])
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     centre = np.array([d.start for d in problem.mount_decisions])
     value, lines = objective_value(problem, evaluate(problem)), search.model.loaded_orders(measure)
@@ -138,8 +138,8 @@ NORMS = {
 @pytest.mark.parametrize("norm", NORMS)
 def test_no_response_that_is_linear_in_a_box_is_under_the_bound_of_its_norm(norm: str, tmp_path: Path) -> None:
     """Random amplitudes of two orders with random slopes: every norm as it is defined, at random places of a box."""
-    asked = f'[objective]\nminimise = "{norm} mount force"\norders = [2, 4]\n[fidelity]\nsamples = 72\n'
-    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked)
+    objective = f'[objective]\nminimise = "{norm} mount force"\norders = [2, 4]\n[fidelity]\nsamples = 72\n'
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective)
     measure, r = problem.objective[0].measure, np.random.default_rng(7)
     lines, count = StiffnessBoxes(problem, 0.0).model.loaded_orders(measure), len(counted_rows(problem, measure)[0])
     angles, k = np.linspace(0.0, np.pi, 180, endpoint=False), len(lines.orders)
@@ -150,10 +150,10 @@ def test_no_response_that_is_linear_in_a_box_is_under_the_bound_of_its_norm(norm
         left_out = LinearResponse(value, slopes, np.zeros((5, k)), np.zeros((5, k, 2)))
         found = norm_under(problem, measure, left_out, lines)
         for s in np.vstack([np.zeros(2), r.uniform(-1.0, 1.0, (6, 2)), r.choice([-1.0, 1.0], (4, 2))]):
-            told = found.value - found.remainder + found.slopes @ s
+            minorants = found.value - found.remainder + found.slopes @ s
             amplitudes = value + np.einsum("n,bknr->bkr", s, slopes)
             signal = np.einsum("bkr,kt->btr", amplitudes, np.exp(1j * np.outer(lines.orders, angles))).real
-            for own, at_box in zip(told, signal, strict=True):
+            for own, at_box in zip(minorants, signal, strict=True):
                 rows = at_box.reshape(len(angles), -1, 3).swapaxes(0, 1)
                 true = [NORMS[norm](np.linalg.norm(each, axis=-1), each[::2]) for each in rows]
                 exact = {"rms": np.sqrt(np.mean(np.square(true))), "mean": np.mean(true)}.get(norm, max(true))
@@ -222,7 +222,7 @@ max = "6000 N"
 
 @pytest.mark.slow
 def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, ASKED["rms"], LIMITS)
+    problem = asked_for(tmp_path, OBJECTIVES["rms"], LIMITS)
     given = evaluate(problem)
     low, high = boxes(problem, 60, 3)
     bounds, _ = StiffnessBoxes(problem, 0.0).bounds(low, high)
@@ -241,13 +241,13 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "asked",
-    [ASKED["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"\norders = [2]'],
+    "objective",
+    [OBJECTIVES["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"\norders = [2]'],
 )
-def test_few_open_stiffnesses_are_decided_with_proof(asked: str, tmp_path: Path) -> None:
+def test_few_open_stiffnesses_are_decided_with_proof(objective: str, tmp_path: Path) -> None:
     """A search over a grid of all designs, which knows nothing of boxes, finds nothing better either."""
     limit = '[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n[search]\nstarts = 2\n'
-    problem = replace(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]", asked, limit), tolerance=1e-3)
+    problem = replace(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]", objective, limit), tolerance=1e-3)
     result = solve(problem)
     assert result.certificate is not None
     assert result.objective is not None
@@ -332,7 +332,7 @@ def test_where_boxes_are_least_is_a_design_too(tmp_path: Path) -> None:
 
 
 def test_how_often_bounds_are_divided_may_be_said(tmp_path: Path) -> None:
-    parts = (ENGINE, BLOCK, MOUNTS, "[objective]", ASKED["rms"])
+    parts = (ENGINE, BLOCK, MOUNTS, "[objective]", OBJECTIVES["rms"])
     none, few = (problem_of(tmp_path, *parts, f"[search]\nboxes = {count}") for count in (0, 40))
     value = 1.17
     assert divided_bound(none, value, 1e-4).boxes == 0
@@ -347,7 +347,7 @@ def test_how_often_bounds_are_divided_may_be_said(tmp_path: Path) -> None:
 def test_what_is_not_divided(tmp_path: Path) -> None:
     """Positions, losses and unbalances move more than stiffness; nine numbers are too many."""
     lossy = changed(MOUNTS, ('position  = ["300', 'loss_factor = { between = [0.05, 0.2] }\nposition  = ["300'))
-    assert not is_stiffness_problem(problem_of(tmp_path, ENGINE, BLOCK, lossy, "[objective]", ASKED["rms"]))
+    assert not is_stiffness_problem(problem_of(tmp_path, ENGINE, BLOCK, lossy, "[objective]", OBJECTIVES["rms"]))
     many = load(PROBLEMS / "powertrain-least-force.toml")
     assert is_stiffness_problem(many)
     assert divided_bound(many, 13.1, 1e-3).boxes == 0

@@ -116,9 +116,9 @@ def test_components_by_order_make_the_curves(result: Result, folder: Path) -> No
                 rows[f"final: {what} of shaking force {axis} [{unit}]"].to_numpy()
                 for what, unit in (("amplitude", "N"), ("phase", "deg"))
             )
-            wanted = curve[f"final: shaking force {axis} [N]"].to_numpy()
+            expected = curve[f"final: shaking force {axis} [N]"].to_numpy()
             summed = np.cos(turns + np.radians(phase)) @ size
-            assert summed == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max() + 1e-9)
+            assert summed == pytest.approx(expected, abs=1e-6 * np.abs(expected).max() + 1e-9)
         hertz = rows["order"] * point.speed / math.tau
         assert rows["final: frequency [Hz]"].to_numpy() == pytest.approx(hertz.to_numpy())
 
@@ -301,9 +301,9 @@ def test_a_willans_line_is_a_file_with_its_readings() -> None:
     x, y = measured_rows[:, 1 if test.is_motored else 0], measured_rows[:, 3 if test.is_motored else 2]
     slope, intercept = np.polyfit(x, y, 1)
     assert measured_rows[:, 4] == pytest.approx(intercept + slope * x, rel=1e-9)
-    told = next(row for row in rows if row[1] == "friction")
-    assert told[2] == pytest.approx(-intercept / slope, rel=1e-9)
-    assert told[7] == test.friction.deviation
+    friction_row = next(row for row in rows if row[1] == "friction")
+    assert friction_row[2] == pytest.approx(-intercept / slope, rel=1e-9)
+    assert friction_row[7] == test.friction.deviation
 
 
 @pytest.mark.slow

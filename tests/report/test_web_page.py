@@ -101,9 +101,9 @@ def test_both_pages_say_the_same() -> None:
     words = " ".join(" ".join(_Page(as_html(document, {})).words).split())
     for line in result_document(result, (), "laufruhe solve scene.toml").as_markdown("").splitlines():
         for cell in line.strip("| ").split(" | "):
-            told = re.sub(r"\\(.)", r"\1", cell).lstrip("#- ").strip()
-            if told and not told.startswith("```") and not set(told) <= set("-:| "):
-                assert told in words, told
+            cell_text = re.sub(r"\\(.)", r"\1", cell).lstrip("#- ").strip()
+            if cell_text and not cell_text.startswith("```") and not set(cell_text) <= set("-:| "):
+                assert cell_text in words, cell_text
 
 
 def test_what_looks_like_a_tag_is_text() -> None:

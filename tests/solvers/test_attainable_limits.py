@@ -62,21 +62,21 @@ BLOCK = {
 }  # fmt: skip
 
 
-def limit(quantity: str, **told: Any) -> dict[str, Any]:
-    return {"limit": quantity, **told}
+def limit(quantity: str, **keys: Any) -> dict[str, Any]:
+    return {"limit": quantity, **keys}
 
 
 LIGHT = limit("counterweight mass", max="0.3 kg", name="light")
 QUIET = limit("maximum mount force", max="900 N", operating_points=["rated"], name="quiet")
 
 
-def problem_of(limits: list[dict[str, Any]], **told: Any) -> Problem:
+def problem_of(limits: list[dict[str, Any]], **changes: Any) -> Problem:
     whole = {
         "title": "test", "engine": SINGLE, "mounts": {"positions": POSITIONS}, "operating_points": POINTS, "gas": GAS,
         "counterweights": [WEB], "objective": {"minimise": "mean mount force"}, "fidelity": {"samples": 180},
         "constraints": limits,
     }  # fmt: skip
-    return load_tables({key: value for key, value in (whole | told).items() if value is not None}, Path("t.toml"))
+    return load_tables({key: value for key, value in (whole | changes).items() if value is not None}, Path("t.toml"))
 
 
 def grid_of(problem: Problem) -> Iterator[Evaluation]:
@@ -115,51 +115,51 @@ def test_no_design_of_a_grid_goes_under_what_a_limit_can_reach(name: str) -> Non
     problem = SCENES[name]
     result = laufruhe.solve(problem)
     assert result.status is Status.INFEASIBLE
-    assert [told.name for told in result.reached] == list(result.conflict)
+    assert [reach.name for reach in result.reached] == list(result.conflict)
     designs = [*grid_of(problem)]
-    for told in result.reached:
-        own = next(limit for limit in problem.limits if limit.name == told.name)
+    for reach in result.reached:
+        own = next(limit for limit in problem.limits if limit.name == reach.name)
         others = tuple(limit for limit in problem.limits if limit is not own)
-        kept = [found.value(own.measure) for found in designs if keeps(found, others)]
-        if told.why:
-            assert not kept
+        feasible = [found.value(own.measure) for found in designs if keeps(found, others)]
+        if reach.why:
+            assert not feasible
             assert solve(replace(problem, limits=others)).status is Status.INFEASIBLE
             continue
-        assert told.proof is Proof.GLOBAL
-        assert told.bound > own.maximum
-        assert min(kept, default=math.inf) >= told.bound * (1.0 - 1e-6)
-        values = {decision.name: decision.value for decision in told.decisions}
+        assert reach.proof is Proof.GLOBAL
+        assert reach.bound > own.maximum
+        assert min(feasible, default=math.inf) >= reach.bound * (1.0 - 1e-6)
+        values = {decision.name: decision.value for decision in reach.decisions}
         design = evaluate(problem, problem.design([cmath.rect(values["web.mass"], values["web.angle"])]))
-        assert design.value(own.measure) == pytest.approx(told.value, rel=1e-4)
+        assert design.value(own.measure) == pytest.approx(reach.value, rel=1e-4)
         assert keeps(design, others)
         # the tool finds a design at the value told, and proves that there is none a little lower
         for share, status in ((1.001, (Status.OPTIMAL, Status.FEASIBLE)), (0.999, (Status.INFEASIBLE,))):
-            moved = replace(own, maximum=share * told.value)
+            moved = replace(own, maximum=share * reach.value)
             assert solve(replace(problem, limits=(*others, moved))).status in status
 
 
 @pytest.mark.slow
 def test_every_star_is_looked_at() -> None:
     """Two couples of five cylinders: what one can reach under the other, by all stars there are."""
-    asked = [limit("rms rocking couple", orders=[k], max="300 N m", name=f"order {k}") for k in (1, 2)]
-    problem = problem_of([*asked, limit("rms roll moment", max="9 MN m")], engine=FIVE, counterweights=None)
+    limits = [limit("rms rocking couple", orders=[k], max="300 N m", name=f"order {k}") for k in (1, 2)]
+    problem = problem_of([*limits, limit("rms roll moment", max="9 MN m")], engine=FIVE, counterweights=None)
     result = laufruhe.solve(problem)
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("order 1", "order 2")
     # some stars keep one of them, others the other, whatever one of them breaks
     faint = WEB | {"mass": {"between": ["0 g", "1 g"]}}
-    assert solve(problem_of(asked, engine=FIVE, counterweights=[faint])).conflict == ("order 1", "order 2")
+    assert solve(problem_of(limits, engine=FIVE, counterweights=[faint])).conflict == ("order 1", "order 2")
     pairs = []
     for steps in itertools.permutations(range(1, 5)):
         fixed = {key: value for key, value in FIVE.items() if key != "firing_order"}
         star = problem_of([], engine=fixed | {"throws": [0, *(72 * k for k in steps)]}, counterweights=None)
         found = evaluate(star)
         pairs.append([found.value(limit.measure) for limit in problem.limits[:2]])
-    for k, told in enumerate(result.reached):
-        kept = [pair[k] for pair in pairs if pair[1 - k] <= 300.0]
-        assert told.proof is Proof.GLOBAL
-        assert told.value == pytest.approx(min(kept), rel=1e-9)
-        assert {decision.name for decision in told.decisions} == {f"throw {j}" for j in range(1, 6)}
+    for k, reach in enumerate(result.reached):
+        feasible = [pair[k] for pair in pairs if pair[1 - k] <= 300.0]
+        assert reach.proof is Proof.GLOBAL
+        assert reach.value == pytest.approx(min(feasible), rel=1e-9)
+        assert {decision.name for decision in reach.decisions} == {f"throw {j}" for j in range(1, 6)}
     assert "Without any one of these limits" in explained(result)
 
 
@@ -179,29 +179,29 @@ def mounts_of(front: dict[str, Any], rear: Any = OPEN) -> dict[str, Any]:
 def test_what_is_not_minimised_is_asked_for_at_edges(side: str) -> None:
     """Natural frequencies under a sag, against a grid of both stiffnesses."""
     sides = {"min": "1 Hz", "max": "500 Hz"} | {side: "12 Hz"}
-    asked = [limit("static sag", max="1 mm"), limit("natural frequencies", **sides)]
+    limits = [limit("static sag", max="1 mm"), limit("natural frequencies", **sides)]
     problem = problem_of(
-        asked, block=BLOCK, counterweights=None, mounts=mounts_of({}), objective={"minimise": "total stiffness"}
+        limits, block=BLOCK, counterweights=None, mounts=mounts_of({}), objective={"minimise": "total stiffness"}
     )
     result = laufruhe.solve(problem)
     assert result.status is Status.INFEASIBLE
-    told = next(each for each in result.reached if each.name == "natural frequencies")
-    own = next(limit for limit in problem.limits if limit.name == told.name)
+    reach = next(each for each in result.reached if each.name == "natural frequencies")
+    own = next(limit for limit in problem.limits if limit.name == reach.name)
     others = tuple(limit for limit in problem.limits if limit is not own)
     springs = [np.geomspace(d.set.lower, d.set.upper, 9) for d in problem.decisions]
     # neither limit is of a load
     still = replace(problem, points=())
     designs = (evaluate(still, problem.design(pair)) for pair in itertools.product(*springs))
     extreme = min if side == "min" else max
-    kept = [extreme(found.values(own.measure)) for found in designs if keeps(found, others)]
+    feasible = [extreme(found.values(own.measure)) for found in designs if keeps(found, others)]
     sign = 1.0 if side == "min" else -1.0
-    best = max(sign * value for value in kept)
-    assert told.side == ("at least" if side == "min" else "at most")
-    assert best <= sign * told.bound
-    assert best - 0.01 * abs(best) <= sign * told.value <= sign * told.bound
-    assert told.value == pytest.approx(told.bound, rel=2e-3)
-    values = [decision.value for decision in told.decisions]
-    assert extreme(evaluate(problem, problem.design(values)).values(own.measure)) == pytest.approx(told.value)
+    best = max(sign * value for value in feasible)
+    assert reach.side == ("at least" if side == "min" else "at most")
+    assert best <= sign * reach.bound
+    assert best - 0.01 * abs(best) <= sign * reach.value <= sign * reach.bound
+    assert reach.value == pytest.approx(reach.bound, rel=2e-3)
+    values = [decision.value for decision in reach.decisions]
+    assert extreme(evaluate(problem, problem.design(values)).values(own.measure)) == pytest.approx(reach.value)
 
 
 FORCE = {"minimise": "rms mount force"}
@@ -211,8 +211,8 @@ LOW = mounts_of({"position": ["200 mm", "250 mm", {"between": ["-50 mm", "50 mm"
 @pytest.mark.slow
 def test_the_nearest_design_is_kept_where_none_is_found() -> None:
     """Travel on mounts whose place is open: nothing is proven, and nothing proven is claimed."""
-    asked = [limit("maximum mount travel", max="1 mm"), limit("static sag", max="2 mm")]
-    problem = problem_of(asked, block=BLOCK, counterweights=None, mounts=LOW, objective=FORCE,
+    limits = [limit("maximum mount travel", max="1 mm"), limit("static sag", max="2 mm")]
+    problem = problem_of(limits, block=BLOCK, counterweights=None, mounts=LOW, objective=FORCE,
                          search={"starts": 2, "boxes": 1})  # fmt: skip
     result = laufruhe.solve(problem)
     assert result.status is Status.FAILED
@@ -226,11 +226,11 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
     sides = [np.linspace(d.lower, d.upper, 4) for d in problem.decisions]
     grid = [evaluate(problem, problem.design(list(point))) for point in itertools.product(*sides)]
     assert near.violation <= evaluate(problem).violation(problem.limits)
-    (told,) = result.reached
-    assert told.proof is Proof.LOCAL
-    kept = [found.value(problem.limits[0].measure) for found in grid if keeps(found, problem.limits[1:])]
-    assert told.bound <= min(kept)
-    assert told.value <= 1.05 * min(kept)
+    (reach,) = result.reached
+    assert reach.proof is Proof.LOCAL
+    feasible = [found.value(problem.limits[0].measure) for found in grid if keeps(found, problem.limits[1:])]
+    assert reach.bound <= min(feasible)
+    assert reach.value <= 1.05 * min(feasible)
     written = as_dict(result)
     assert written["objective"]["value"] is None
     assert written["nearest"]["decisions"].keys() == {decision.name for decision in near.decisions}
@@ -293,11 +293,11 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     problem, shares, clock = problem_of([LIGHT, QUIET | {"max": "1.6 kN"}]), [], Clock()
     monkeypatch.setattr("laufruhe.numerics.budget.time", clock)
 
-    def slow(asked: Problem) -> Result:
+    def slow(limits: Problem) -> Result:
         shares.append(seconds_left())
         clock.now += seconds_left()
         with minimum_time(60.0):
-            return replace(solve(asked), certificate=None)
+            return replace(solve(limits), certificate=None)
 
     steps: list[Step] = []
     none = infeasible_result(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
@@ -306,8 +306,8 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
     assert all("at the time limit" in text for text in attainable(found)[:2])
     assert shares[:2] == pytest.approx([0.2, 0.2])
-    told = [(step.done, step.whole) for step in steps if step.what == "attainable limits"]
-    assert told == [(0, 2), (1, 2)]
+    reach = [(step.done, step.whole) for step in steps if step.what == "attainable limits"]
+    assert reach == [(0, 2), (1, 2)]
     # whoever listens is told what is known before what takes longer
     assert {step.within[0] for step in steps} == {none.message}
     assert "contradict" in none.message
@@ -319,8 +319,8 @@ def test_what_nothing_open_changes_stays() -> None:
     problem = problem_of([limit("envelope radius", max="50 mm"), LIGHT], balancer_shafts=[shaft])
     result = laufruhe.solve(problem)
     assert result.status is Status.INFEASIBLE
-    (told,) = result.reached
-    assert told.value == pytest.approx(evaluate(problem).value(problem.limits[-1].measure))
+    (reach,) = result.reached
+    assert reach.value == pytest.approx(evaluate(problem).value(problem.limits[-1].measure))
     assert "stays at" in attainable(result)[0]
     assert "needed" not in explained(result)
 
@@ -342,12 +342,12 @@ def test_an_edge_is_halved_to_the_same_share_in_every_unit(unit: float) -> None:
     problem, edge = problem_of([LIGHT, QUIET]), 1.37 * unit
     own = replace(problem.limits[1], maximum=unit)
 
-    def known(asked: Problem) -> Any:
-        maximum = min((limit.maximum for limit in asked.limits if limit.measure == own.measure), default=2.0 * unit)
+    def known(limits: Problem) -> Any:
+        maximum = min((limit.maximum for limit in limits.limits if limit.measure == own.measure), default=2.0 * unit)
         status = Status.FEASIBLE if maximum >= edge else Status.INFEASIBLE
         return SimpleNamespace(status=status, final=SimpleNamespace(values=lambda _: (maximum,)), decisions=())
 
     entry = AttainableLimit("quiet", "at most", unit, "N")
-    told = _bisect(entry, own, problem, problem.limits[:1], Status.INFEASIBLE, known).attainable
-    assert told.bound < edge <= told.value
-    assert told.value - told.bound <= CLOSE * unit
+    reach = _bisect(entry, own, problem, problem.limits[:1], Status.INFEASIBLE, known).attainable
+    assert reach.bound < edge <= reach.value
+    assert reach.value - reach.bound <= CLOSE * unit

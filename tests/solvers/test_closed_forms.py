@@ -54,10 +54,10 @@ def test_first_order_shaft(throws: list[float], cycle: Cycle, factor: float) -> 
     assert result.objective.initial > 100.0
     assert result.objective.value <= 1e-6 * result.objective.initial
     size = {rotor.name: abs(rotor.unbalance) for rotor in result.final.engine.rotors}
-    wanted = HALF * SPACING * factor
-    assert size["shaft.front"] * s == pytest.approx(wanted, rel=1e-5)
-    assert size["shaft.rear"] * s == pytest.approx(wanted, rel=1e-5)
-    assert size["web front"] * s == pytest.approx(wanted, rel=1e-5)
+    expected = HALF * SPACING * factor
+    assert size["shaft.front"] * s == pytest.approx(expected, rel=1e-5)
+    assert size["shaft.rear"] * s == pytest.approx(expected, rel=1e-5)
+    assert size["web front"] * s == pytest.approx(expected, rel=1e-5)
 
 
 def _couple(throws: list[float]) -> complex:

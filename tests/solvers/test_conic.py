@@ -151,12 +151,12 @@ def test_a_solver_that_gives_up_is_not_the_end(status: str, monkeypatch: pytest.
     """A design is left, no worse than the one given, with the bound that holds; nothing is called impossible."""
     word, value = STOPPED[status]
 
-    def told(rows: Any, cost: Any, *_: Any) -> Any:
+    def failing(rows: Any, cost: Any, *_: Any) -> Any:
         x, z = np.full(rows.columns, value), np.full(rows.count, value)
         return SimpleNamespace(status=word, x=x, z=z, solve_time=0.0, iterations=1)
 
-    monkeypatch.setattr(conic, "run_clarabel", told)
-    monkeypatch.setattr(newton, "run_clarabel", told)
+    monkeypatch.setattr(conic, "run_clarabel", failing)
+    monkeypatch.setattr(newton, "run_clarabel", failing)
     result = solve(limited(0.5))
     assert result.status is Status.FEASIBLE
     assert result.objective is not None
@@ -214,7 +214,7 @@ orders = [2]
 
 @pytest.mark.parametrize("upper", [2e-8, 0.02, 2e2])
 @pytest.mark.parametrize(
-    ("throws", "asked"),
+    ("throws", "objective"),
     [
         pytest.param([0, 120, 240], FORCE, id="zero"),
         pytest.param(ROUNDED, FORCE, id="next to zero"),
@@ -230,9 +230,9 @@ orders = [2]
         ),
     ],
 )
-def test_what_is_balanced_but_for_rounding(throws: list[float], asked: str, upper: float, tmp_path: Path) -> None:
+def test_what_is_balanced_but_for_rounding(throws: list[float], objective: str, upper: float, tmp_path: Path) -> None:
     """Nothing to gain, in loads of 1e-12 N beside those of bounds of any size: an optimum, and proven."""
-    problem = loaded(tmp_path, BALANCED.format(throws=throws, upper=upper, asked=asked))
+    problem = loaded(tmp_path, BALANCED.format(throws=throws, upper=upper, asked=objective))
     result = laufruhe.solve(problem)
     assert result.objective is not None
     assert result.certificate is not None

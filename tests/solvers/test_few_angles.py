@@ -86,12 +86,12 @@ def test_a_mean_that_is_all_but_least_is_sought_at_more_angles() -> None:
     """The force is no less than 1071.66270 N, which 768 angles of two turns do not tell."""
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 180.7}]}
-    told = {
+    tables = {
         **SINGLE, "engine": {**SINGLE["engine"], "cycle": "four-stroke", "throws": [0.7]},
         "balancer_shafts": [turned, right], "objective": {"minimise": "rms shaking force"},
         "constraints": [{"limit": "mean shaking force", "max": "1071.6648434 N"}],
     }  # fmt: skip
-    assert solve(load_tables(told, Path("single.toml"))).status.has_design
+    assert solve(load_tables(tables, Path("single.toml"))).status.has_design
 
 
 @pytest.mark.parametrize("samples", [180, 480])
@@ -99,24 +99,24 @@ def test_a_limit_that_is_all_but_the_least_has_a_design(samples: int) -> None:
     """The force is no less than 1071.66270 N, which is over this limit by half of what counts as kept."""
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183.1}]}
-    told = {
+    tables = {
         **SINGLE, "engine": {**SINGLE["engine"], "cycle": "four-stroke", "throws": [3.1]},
         "balancer_shafts": [turned, right], "fidelity": {"samples": samples},
         "objective": {"minimise": "rms shaking force"},
         "constraints": [{"name": "quiet", "limit": "mean shaking force", "max": "1071.6574 N"}],
     }  # fmt: skip
-    result = solve(load_tables(told, Path("single.toml")))
+    result = solve(load_tables(tables, Path("single.toml")))
     assert result.status.has_design
     assert 0.0 < with_fine_sampling(result.final).violation(result.problem.limits) <= FEASIBILITY_TOL
 
 
 def out_of_reach() -> Problem:
     """The force is no less than 1071.66270 N, but 480 angles read 1.8e-5 less of that design."""
-    told = {
+    tables = {
         **SINGLE, "fidelity": {"samples": 60}, "objective": {"minimise": "rms shaking force"},
         "constraints": [{"name": "quiet", "limit": "mean shaking force", "max": "1071.64877 N"}],
     }  # fmt: skip
-    return load_tables(told, Path("single.toml"))
+    return load_tables(tables, Path("single.toml"))
 
 
 def test_a_proof_stands_against_what_few_angles_read() -> None:
@@ -124,8 +124,8 @@ def test_a_proof_stands_against_what_few_angles_read() -> None:
     assert solve(problem).status is Status.INFEASIBLE
     result = laufruhe.solve(problem)
     assert result.status is Status.INFEASIBLE
-    (told,) = result.reached
-    assert told.limit < told.value == pytest.approx(1071.6627, abs=1e-4)
+    (reach,) = result.reached
+    assert reach.limit < reach.value == pytest.approx(1071.6627, abs=1e-4)
 
 
 @pytest.mark.parametrize(("samples", "maximum"), [(48, 1070.7), (48, 1071.6), (60, 1070.591), (60, 1071.6488)])
@@ -134,13 +134,13 @@ def test_a_design_is_none_where_few_angles_alone_allow_it(samples: int, maximum:
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183.1}]}
     for limit, met in ((maximum, False), (1071.664, True)):
-        told = {
+        tables = {
             **SINGLE, "engine": {**SINGLE["engine"], "cycle": "four-stroke", "throws": [3.1]},
             "balancer_shafts": [turned, right], "fidelity": {"samples": samples},
             "objective": {"minimise": "rms shaking force"},
             "constraints": [{"limit": "mean shaking force", "max": f"{limit} N"}],
         }  # fmt: skip
-        result = solve(load_tables(told, Path("single.toml")))
+        result = solve(load_tables(tables, Path("single.toml")))
         assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
         assert not met or with_fine_sampling(result.final).violation(result.problem.limits) <= FEASIBILITY_TOL
 
@@ -151,8 +151,8 @@ def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -
     failed = replace(solve(problem), status=Status.FAILED, conflict=())
     met: list[bool] = []
 
-    def decide(asked: Problem) -> Result:
-        result = solve(asked)
+    def decide(candidate: Problem) -> Result:
+        result = solve(candidate)
         met.append(not violated_limits(problem.limits, result.final))
         assert violated_limits(problem.limits, with_fine_sampling(result.final))
         return result
@@ -167,7 +167,7 @@ def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -
 @pytest.mark.slow
 def test_stars_are_not_excluded_by_means_at_the_few_angles_of_a_program() -> None:
     """The mixed-integer program has 24 angles, at which no star keeps this couple; over the cycle 470.2 N m is."""
-    told = {
+    tables = {
         **SINGLE,
         "engine": {
             "layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.28, "cylinders": 5,
@@ -182,18 +182,18 @@ def test_stars_are_not_excluded_by_means_at_the_few_angles_of_a_program() -> Non
         "objective": {"minimise": "rms rocking couple"},
         "constraints": [{"limit": "mean rocking couple", "max": "470.277 N m"}],
     }  # fmt: skip
-    assert solve(load_tables(told, Path("five.toml"))).status is not Status.INFEASIBLE
+    assert solve(load_tables(tables, Path("five.toml"))).status is not Status.INFEASIBLE
 
 
 def test_a_limit_that_nothing_open_moves_is_read_at_many_angles() -> None:
     """What a cylinder shakes with is no matter of its mounts; 48 angles have a quarter of a percent more of it."""
-    told = {
+    tables = {
         **SINGLE, **mounted(), "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [],
         "objective": {"minimise": "rms mount force"},
         "constraints": [{"limit": "mean shaking force", "orders": [2], "max": "964.7 N"}],
     }  # fmt: skip
-    told["mounts"]["places"][0]["stiffness"] = ["100 N/mm", "100 N/mm", {"between": ["50 N/mm", "200 N/mm"]}]
-    problem = load_tables(told, Path("mounted.toml"))
+    tables["mounts"]["places"][0]["stiffness"] = ["100 N/mm", "100 N/mm", {"between": ["50 N/mm", "200 N/mm"]}]
+    problem = load_tables(tables, Path("mounted.toml"))
     assert violated_limits(problem.limits, evaluate(problem))
     result = solve(problem)
     assert result.status.has_design
@@ -205,8 +205,8 @@ def test_a_limit_that_nothing_open_moves_is_read_at_many_angles() -> None:
 def test_a_star_is_excluded_by_what_the_cycle_has(maximum: str, excluded: bool) -> None:
     """The cycle has 964.63 N of second order, 48 angles have 967.06 N."""
     limits = [{"limit": "mean shaking force", "orders": [2], "max": maximum}]
-    told = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [], "constraints": limits}
-    design = StarDesign(Candidate((0.0,)), evaluate_only(load_tables(told, Path("single.toml"))))
+    tables = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [], "constraints": limits}
+    design = StarDesign(Candidate((0.0,)), evaluate_only(load_tables(tables, Path("single.toml"))))
     assert not design.is_feasible
     assert design.is_infeasible is excluded
 
@@ -214,9 +214,9 @@ def test_a_star_is_excluded_by_what_the_cycle_has(maximum: str, excluded: bool) 
 def test_a_design_is_not_broken_by_what_few_angles_read_of_a_limit_that_it_cannot_move() -> None:
     """Shafts at the speed of the crank beside a limit on the second order, which 96 angles have too much of."""
     limits = [{"limit": "mean shaking force", "orders": [2], "max": "964.64 N"}]
-    told = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [2]}, "constraints": limits}
-    told["objective"] = {"minimise": "rms shaking force"}
-    result = solve(load_tables(told, Path("single.toml")))
+    tables = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [2]}, "constraints": limits}
+    tables["objective"] = {"minimise": "rms shaking force"}
+    result = solve(load_tables(tables, Path("single.toml")))
     assert result.status is Status.OPTIMAL
     assert result.limits[0].value == pytest.approx(964.6277, rel=1e-6)
 
@@ -225,10 +225,10 @@ LEAST = 2.28031126625055
 """Mean mount force of order 2 that no stiffness of `on_open_mounts` goes under over the cycle [N]."""
 
 
-def on_open_mounts(throw: float, **told: Any) -> Problem:
+def on_open_mounts(throw: float, **changes: Any) -> Problem:
     """A single whose one stiffness is open; few angles read up to a third of a percent too much or too little."""
     tables = {
-        **SINGLE, **mounted(), "engine": {**SINGLE["engine"], "throws": [throw]}, "balancer_shafts": [], **told,
+        **SINGLE, **mounted(), "engine": {**SINGLE["engine"], "throws": [throw]}, "balancer_shafts": [], **changes,
     }  # fmt: skip
     tables["mounts"]["places"][0]["stiffness"] = ["100 N/mm", "100 N/mm", {"between": ["50 N/mm", "200 N/mm"]}]
     return load_tables(tables, Path("mounted.toml"))
@@ -241,12 +241,12 @@ def second(share: float) -> dict[str, Any]:
 @pytest.mark.parametrize(("share", "met"), [(1.0001, True), (0.9999, False)])
 @pytest.mark.parametrize(("throw", "samples"), first_fast([(3, 60), (0, 60), (1, 48)], 0, 2))
 def test_stiffness_is_excluded_by_what_the_cycle_has(throw: float, samples: int, share: float, met: bool) -> None:
-    asked = on_open_mounts(
+    problem = on_open_mounts(
         throw, fidelity={"samples": samples}, objective={"minimise": "rms mount force"}, constraints=[second(share)]
     )
-    result = solve(asked)
+    result = solve(problem)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= FEASIBILITY_TOL
+    assert not met or with_fine_sampling(result.final).violation(problem.limits) <= FEASIBILITY_TOL
 
 
 @pytest.mark.parametrize("samples", [48, 60])

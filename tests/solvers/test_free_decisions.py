@@ -48,14 +48,14 @@ def web(name: str, maximum: str = "2 kg", x: str = "0 mm") -> dict[str, Any]:
 
 
 def problem_of(
-    minimise: str, webs: list[dict[str, Any]], narrowed: dict[str, Any] | None = None, **told: Any
+    minimise: str, webs: list[dict[str, Any]], narrowed: dict[str, Any] | None = None, **changes: Any
 ) -> Problem:
     whole = {
         "title": "test", "engine": ENGINE, "mounts": {"positions": POSITIONS}, "operating_points": POINTS,
         "gas": {"model": "seiliger", "peak_pressure": "80 bar", "imep": "6 bar"}, "fidelity": {"samples": 360},
         "counterweights": webs, "objective": {"minimise": minimise} | (narrowed or {}),
     }  # fmt: skip
-    return load_tables(whole | told, Path("t.toml"))
+    return load_tables(whole | changes, Path("t.toml"))
 
 
 def ends_of(result: Result) -> dict[str, tuple[float, float]]:
@@ -75,9 +75,9 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_two_weights_in_one_place_are_free_against_each_other(name: str) -> None:
     """Their sum alone counts, so the ends follow from it and from what each may be."""
-    told = SCENES[name]
-    result = laufruhe.solve(problem_of("mean mount force", TWINS, **told))
-    alone = laufruhe.solve(problem_of("mean mount force", [web("both", "2.8 kg", "200 mm")], **told))
+    settings = SCENES[name]
+    result = laufruhe.solve(problem_of("mean mount force", TWINS, **settings))
+    alone = laufruhe.solve(problem_of("mean mount force", [web("both", "2.8 kg", "200 mm")], **settings))
     assert alone.free == ()
     whole = sum(decision.value for decision in result.decisions if decision.unit == "kg")
     assert whole == pytest.approx(next(d.value for d in alone.decisions if d.unit == "kg"), rel=1e-3, abs=1e-4)
@@ -94,8 +94,8 @@ def test_what_the_objective_does_not_feel_is_free_from_bound_to_bound() -> None:
     result = laufruhe.solve(problem_of("rms mount force", [web("web")], {"orders": [2]}))
     assert ends_of(result)["web.mass"] == pytest.approx((0.0, 2.0), abs=1e-6)
     assert "not unique" in decisions(result)[0].note
-    (told,) = as_dict(result)["free_decisions"]
-    assert told == {"name": "web.mass", "unit": "kg", "low": pytest.approx(0.0), "high": pytest.approx(2.0)}
+    (record,) = as_dict(result)["free_decisions"]
+    assert record == {"name": "web.mass", "unit": "kg", "low": pytest.approx(0.0), "high": pytest.approx(2.0)}
 
 
 GRIDS = [
@@ -106,10 +106,10 @@ GRIDS = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("minimise", "told"), GRIDS)
-def test_a_grid_shows_the_same(minimise: str, told: dict[str, Any]) -> None:
+@pytest.mark.parametrize(("minimise", "settings"), GRIDS)
+def test_a_grid_shows_the_same(minimise: str, settings: dict[str, Any]) -> None:
     """All between the ends is as good; and where none is told, no two designs far apart are."""
-    problem = problem_of(minimise, [web("web", "4 kg")], **told)
+    problem = problem_of(minimise, [web("web", "4 kg")], **settings)
     result = laufruhe.solve(problem)
     best, masses = result.objective.value, np.linspace(0.0, 4.0, 41)
     values = np.array([objective_value(problem, evaluate(problem, problem.design([mass]))) for mass in masses])
@@ -131,12 +131,12 @@ def test_with_a_free_decision_held_the_optimum_is_as_good(name: str) -> None:
     """Of ready problems, at both ends and between them; beside limits on peaks, and in the plane."""
     problem = load(PROBLEMS / f"{name}.toml")
     result = laufruhe.solve(problem)
-    found = [told for told in result.free if not told.name.endswith(".angle")]
+    found = [free_decision for free_decision in result.free if not free_decision.name.endswith(".angle")]
     assert found
-    best, told = result.objective.value, found[0]
-    k = next(k for k, decision in enumerate(problem.decisions) if decision.name == told.name)
+    best, free_decision = result.objective.value, found[0]
+    k = next(k for k, decision in enumerate(problem.decisions) if decision.name == free_decision.name)
     for share in (0.0, 0.5, 1.0):
-        size = told.low + share * (told.high - told.low)
+        size = free_decision.low + share * (free_decision.high - free_decision.low)
         held = holding(problem, k, size)
         again = solve(held)
         assert again.objective.value <= best * (1.0 + 2.0 * problem.tolerance)
@@ -170,9 +170,9 @@ def test_prices_within_the_accuracy_are_none() -> None:
         shown = ProofData(
             design.value * (1.0 - 1e-4), ProofStrength.EXACT, 0.0, "", {}, {"web.mass": Price.both(slope * scale)}
         )
-        (told,) = build_result(design, design.evaluation, shown, {}).decisions
-        assert told.at_bound
-        assert told.shadow_price == (pytest.approx(slope * scale) if priced else 0.0)
+        (decision,) = build_result(design, design.evaluation, shown, {}).decisions
+        assert decision.at_bound
+        assert decision.shadow_price == (pytest.approx(slope * scale) if priced else 0.0)
 
 
 def test_an_angle_of_nothing_is_not_shown() -> None:
@@ -205,6 +205,6 @@ def test_a_free_angle_runs_from_the_first_to_the_last_of_its_designs() -> None:
              "objective": {"minimise": "rms shaking force"}}  # fmt: skip
     (domain,) = domains_of(load_tables(table, Path("one.toml")).decisions)
     turns = (0.5, 0.2, 0.9)
-    told = ranges_of(domain, [0.05 * np.array([math.cos(turn), math.sin(turn)]) for turn in turns])
-    assert [(one.name, one.unit) for one in told] == [("web.angle", "rad")]
-    assert (told[0].low, told[0].high) == pytest.approx((0.2, 0.9))
+    ranges = ranges_of(domain, [0.05 * np.array([math.cos(turn), math.sin(turn)]) for turn in turns])
+    assert [(one.name, one.unit) for one in ranges] == [("web.angle", "rad")]
+    assert (ranges[0].low, ranges[0].high) == pytest.approx((0.2, 0.9))

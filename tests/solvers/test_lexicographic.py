@@ -109,8 +109,8 @@ def test_equal_optima_are_named() -> None:
     assert ends[1]["forward.mass"] == pytest.approx((0.0, 4.0), abs=1e-5)
     assert "backward.mass" not in ends[0]
     assert ends[2] == {}
-    told = {grid.title: grid.rows for grid in tables_of(solved("single-three-balances"))}
-    assert ("web.balance_factor", "0 to 1", "0 to 0.5", "0.5") in told["Equal optima"]
+    tables = {grid.title: grid.rows for grid in tables_of(solved("single-three-balances"))}
+    assert ("web.balance_factor", "0 to 1", "0 to 0.5", "0.5") in tables["Equal optima"]
 
 
 @pytest.mark.slow

@@ -63,8 +63,8 @@ def _text(seed: int, weights: tuple[tuple[str, str, str], ...], more: str = "") 
     maximum = generator.uniform(0.05, 1.5)
     text = ENGINE.format(mass="0.8 kg", throws=throws, measure=measure)
     for name, (x, mass, angle) in zip("ab", weights, strict=False):
-        told = (each.format(maximum=maximum) for each in (x, mass, angle))
-        text += WEIGHT.format(**dict(zip(("x", "mass", "angle"), told, strict=True)), name=name)
+        texts = (each.format(maximum=maximum) for each in (x, mass, angle))
+        text += WEIGHT.format(**dict(zip(("x", "mass", "angle"), texts, strict=True)), name=name)
     return text + more
 
 

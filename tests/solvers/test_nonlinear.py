@@ -107,8 +107,8 @@ def test_the_residual_by_hand(gradient, multiplier, bounds, constraint, residual
     task = Task("", *sides, np.ones(2), 1.0, ((),), 1, 1.0, False)
     point, slopes = np.array([0.0, 0.25]), np.array([[2.0, 1.0]])
     numbers = (np.array(v, ndmin=1) for v in (constraint, gradient))
-    told, violation = _kkt_residual(task, point, *numbers, slopes, np.array([multiplier]), np.array(bounds))
-    assert told == pytest.approx(residual, rel=1e-12)
+    computed, violation = _kkt_residual(task, point, *numbers, slopes, np.array([multiplier]), np.array(bounds))
+    assert computed == pytest.approx(residual, rel=1e-12)
     assert violation == pytest.approx(max(constraint - 1.0, 0.0), rel=1e-12)
 
 

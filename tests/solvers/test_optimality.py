@@ -215,9 +215,9 @@ def test_a_limit_that_only_finer_angles_contradict_is_told(samples: int) -> None
     p = problem(machine, ["left"], GAS, fidelity=Fidelity("exact", samples), upper=0.02)
     peak = evaluate(p, samples=5760).value(roll)
     mass = Limit("mass", BALANCER_MASS, 5.0)
-    told = solve(replace(p, limits=(mass, Limit("roll", roll, peak * (1.0 - 2e-5)))))
-    assert told.status is Status.INFEASIBLE
-    assert told.conflict == ("roll",)
+    result = solve(replace(p, limits=(mass, Limit("roll", roll, peak * (1.0 - 2e-5)))))
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("roll",)
     assert solve(replace(p, limits=(mass, Limit("roll", roll, peak)))).status is Status.OPTIMAL
 
 

@@ -29,8 +29,8 @@ SINGLE: dict[str, Any] = {
 SECOND = {"minimise": "mean shaking force", "orders": [2]}
 
 
-def problem(told: dict[str, Any], **more: Any) -> Problem:
-    return load_tables({**SINGLE, **told, **more}, Path("told.toml"))
+def problem(tables: dict[str, Any], **more: Any) -> Problem:
+    return load_tables({**SINGLE, **tables, **more}, Path("told.toml"))
 
 
 @pytest.mark.parametrize(("maximum", "met"), [(5820.0, False), (5821.0, True)])
@@ -41,22 +41,22 @@ def test_leads_keep_limits_over_the_cycle(maximum: float, met: bool) -> None:
         {"x": "0 mm", "throw": 0, "shaft": "crankshaft"}, {"x": "100 mm", "throw": 40, "shaft": "led"},
     ]  # fmt: skip
     engine = {k: v for k, v in ENGINE.items() if k != "throws"}
-    asked = problem(
+    case = problem(
         {"engine": {**engine, "layout": "parts", "shafts": [shaft], "slider_cranks": cranks}},
         objective={"minimise": "rms rocking couple"},
         constraints=[{"name": "quiet", "limit": "mean shaking force", "max": f"{maximum} N"}],
     )
-    result = solve(asked)
+    result = solve(case)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= FEASIBILITY_TOL
+    assert not met or with_fine_sampling(result.final).violation(case.limits) <= FEASIBILITY_TOL
 
 
 def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> None:
     """The cycle has 964.63 N of second order, 48 angles have 959.1 N."""
     limit = {"name": "second", "limit": "mean shaking force", "orders": [2], "max": "962 N"}
-    told = problem({}, objective={"minimise": "rms shaking force"}, constraints=[limit])
-    assert evaluate(told).violation(told.limits) <= 0.0
-    assert violated_limits(told.limits, with_fine_sampling(evaluate(told))) == ("second",)
+    case = problem({}, objective={"minimise": "rms shaking force"}, constraints=[limit])
+    assert evaluate(case).violation(case.limits) <= 0.0
+    assert violated_limits(case.limits, with_fine_sampling(evaluate(case))) == ("second",)
 
 
 def test_a_program_in_which_nothing_is_open_is_its_own_answer() -> None:
@@ -69,16 +69,16 @@ def test_a_program_in_which_nothing_is_open_is_its_own_answer() -> None:
 
 def test_a_crank_of_a_box_that_breaks_a_limit_is_no_design() -> None:
     vee = {**ENGINE, "layout": "vee", "cylinder_spacing": "100 mm", "bank_angle": {"between": [60, 90]}, "cylinders": 2}
-    told = problem(
+    case = problem(
         {"engine": {**vee, "throws": "open", "firing_order": [1, 2]}},
         phasing={"intervals": {"min": 1.0, "max": 359.0}},
         objective={"minimise": "rms rocking couple"},
         constraints=[{"name": "quiet", "limit": "rms shaking force", "max": "1 N"}],
     )
-    phasing = told.phasing
+    phasing = case.phasing
     assert phasing is not None
     candidate = Candidate((0.0,), (1, 2), np.radians(75.0))
-    free = told.changed(limits=())
+    free = case.changed(limits=())
     assert free.phasing is not None
     assert evaluate_crank(free.phasing, candidate) is not None
     assert evaluate_crank(phasing, candidate) is None
@@ -88,10 +88,10 @@ def test_a_proven_optimum_that_breaks_a_peak_between_angles_is_solved_anew() -> 
     """The least mass under the least peak there is: a gap that is closed at few angles ends no search."""
     weight = {"name": "w", "x": "0 mm", "radius": "1 m", "angle": {"between": [0, 360]},
               "unbalance": {"between": ["0 kg m", "0.1 kg m"]}}  # fmt: skip
-    told = {"engine": {**ENGINE, "throws": [3]}, "counterweights": [weight]}
+    tables = {"engine": {**ENGINE, "throws": [3]}, "counterweights": [weight]}
     peak = {"minimise": "maximum shaking force"}
-    minimum = solve(problem(told, objective=peak, fidelity={"samples": 5760})).objective.value
+    minimum = solve(problem(tables, objective=peak, fidelity={"samples": 5760})).objective.value
     limit = {"limit": "maximum shaking force", "max": f"{minimum} N"}
-    result = solve(problem(told, objective={"minimise": "added mass"}, constraints=[limit], fidelity={"samples": 48}))
+    result = solve(problem(tables, objective={"minimise": "added mass"}, constraints=[limit], fidelity={"samples": 48}))
     assert result.status is Status.OPTIMAL
     assert result.final.violation(result.problem.limits) <= FEASIBILITY_TOL

@@ -31,10 +31,10 @@ def test_prices_are_what_the_optimum_moves_by(seed: int) -> None:
         rows.append(rows[0].copy())
     slope = -sum(random.uniform(0.5, 1.0, len(own)) @ own for own in rows)
     limits, edges = rows[:2] + rows[3:], rows[2]
-    told = prices_of([Slopes.smooth(slope)], [Slopes(own, np.zeros((0, 3))) for own in limits], edges)
-    assert told is not None
+    prices = prices_of([Slopes.smooth(slope)], [Slopes(own, np.zeros((0, 3))) for own in limits], edges)
+    assert prices is not None
     ordered = [*limits, edges]
-    for k, price in enumerate(told):
+    for k, price in enumerate(prices):
         assert price.relaxed == pytest.approx(-moved(slope, ordered, k, 1.0), rel=1e-4, abs=1e-4)
         assert price.tightened == pytest.approx(moved(slope, ordered, k, -1.0), rel=1e-4, abs=1e-4)
 

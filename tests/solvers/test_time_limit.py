@@ -104,17 +104,17 @@ problem = "{PROBLEMS / "tractor-single.toml"}"
 @pytest.mark.slow
 def test_a_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = ["study", str(written(tmp_path, SWEEP)), "--out", str(tmp_path / "out"), "--jobs", "1"]
-    asked = iter(range(100))
+    calls = iter(range(100))
     with monkeypatch.context() as patched:
-        patched.setattr("laufruhe.studies.runner.is_time_over", lambda: next(asked) >= 3)
+        patched.setattr("laufruhe.studies.runner.is_time_over", lambda: next(calls) >= 3)
         stopped = CliRunner().invoke(app, words)
     assert stopped.exit_code == 1
     assert "the same command goes on" in stopped.stderr
-    kept = tmp_path / "out/.unfinished-points.jsonl"
-    assert kept.read_bytes().count(b"\n\n") == 2
-    assert {entry.name for entry in (tmp_path / "out").iterdir()} == {kept.name}
+    points_file = tmp_path / "out/.unfinished-points.jsonl"
+    assert points_file.read_bytes().count(b"\n\n") == 2
+    assert {entry.name for entry in (tmp_path / "out").iterdir()} == {points_file.name}
     assert CliRunner().invoke(app, words).exit_code == 0
-    assert not kept.exists()
+    assert not points_file.exists()
     assert (tmp_path / "out/report.md").is_file()
 
 
@@ -126,8 +126,8 @@ def test_a_trade_keeps_what_is_measured(tmp_path: Path, monkeypatch: pytest.Monk
     assert stopped.exit_code == 1
     assert "time limit" in stopped.stderr
     assert not out.exists()
-    asked = iter(range(100))
-    monkeypatch.setattr("laufruhe.extensions.fidelity.trade.is_time_over", lambda: next(asked) >= 3)
+    calls = iter(range(100))
+    monkeypatch.setattr("laufruhe.extensions.fidelity.trade.is_time_over", lambda: next(calls) >= 3)
     some = CliRunner().invoke(app, ["trade", str(path), "--out", str(out)])
     assert some.exit_code == 0
     assert "Stopped at the time limit" in (out / "scene.md").read_text(encoding="utf-8")

@@ -88,9 +88,9 @@ weight = 2
 def closed(tmp_path: Path) -> Problem:
     """Elastic mounts without anything open, and a transmissibility to be least."""
     mounts = changed(MOUNTS, (OPEN, '"400 N/mm"'), (OPEN, '"400 N/mm"'))
-    wanted = '[objective]\nminimise = "transmissibility"\noperating_points = ["idle"]\norders = [1]\n'
+    objective = '[objective]\nminimise = "transmissibility"\noperating_points = ["idle"]\norders = [1]\n'
     yoke = changed(ENGINE, ("0.26", "0"), ("[0, 180, 180, 0]", "[0]"))
-    return problem_of(tmp_path, yoke, BLOCK, mounts, wanted)
+    return problem_of(tmp_path, yoke, BLOCK, mounts, objective)
 
 
 def test_nothing_open_on_elastic_mounts_is_evaluated(closed: Problem) -> None:

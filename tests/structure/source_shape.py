@@ -200,14 +200,14 @@ def operands(tree: ast.Module) -> tuple[ast.expr, ...]:
     """What comparisons, patterns and `isinstance` ask for, tuples taken apart."""
     found: list[ast.expr] = []
     for node in ast.walk(tree):
-        asked: list[ast.expr] = []
+        compared: list[ast.expr] = []
         if isinstance(node, ast.Compare):
-            asked = [node.left, *node.comparators]
+            compared = [node.left, *node.comparators]
         elif isinstance(node, ast.MatchValue):
-            asked = [node.value]
+            compared = [node.value]
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
-            asked = node.args[1:]
-        for expression in asked:
+            compared = node.args[1:]
+        for expression in compared:
             found += expression.elts if isinstance(expression, ast.Tuple | ast.Set | ast.List) else [expression]
     return tuple(found)
 
@@ -282,8 +282,10 @@ def main() -> None:
     found = measured()
     if "--prune" in sys.argv:
         allowed = exceptions()
-        kept = {rule: {name for name in names if still_allowed(name, allowed[rule])} for rule, names in found.items()}
-        EXCEPTIONS.write_text(written(kept), encoding="utf-8")
+        allowed_names = {
+            rule: {name for name in names if still_allowed(name, allowed[rule])} for rule, names in found.items()
+        }
+        EXCEPTIONS.write_text(written(allowed_names), encoding="utf-8")
         return
     sys.stdout.write(written(found) + f"\n# {total_lines()} lines in all\n")
 

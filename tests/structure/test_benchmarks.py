@@ -46,8 +46,8 @@ def test_one_after_the_other_whatever_becomes_of_them(tmp_path: Path):
     done = ran("-c", given, "--limit", "4")
     lines = done.stdout.splitlines()
     assert done.returncode == 1, done.stderr
-    for k, (name, (_, told)) in enumerate(SHORT.items(), 1):
+    for k, (name, (_, expected)) in enumerate(SHORT.items(), 1):
         (line,) = [line for line in lines if line.startswith(f"[{k}/{len(SHORT)}] {name} ... ")]
-        assert told in line
+        assert expected in line
     assert "no room" in lines
     assert lines[-1].endswith("; 2 failed")

@@ -18,7 +18,7 @@ OWN = f"{HERE}::test_a_run_lists_what_took_longer"
 
 
 @pytest.fixture
-def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def timer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A list of its own, and a run that says what tests took."""
     path = tmp_path / "a/slow.txt"
     path.parent.mkdir()
@@ -37,12 +37,12 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     return run
 
 
-def test_a_run_lists_what_took_longer(told: CoreSeconds) -> None:
-    told.pytest_terminal_summary(SimpleNamespace())
+def test_a_run_lists_what_took_longer(timer: CoreSeconds) -> None:
+    timer.pytest_terminal_summary(SimpleNamespace())
     assert listed_now() == [f"{OWN}[not run]", f"{OWN}[now slow]"]
 
 
-def test_what_is_listed_is_marked_unless_it_is_measured_anew(told: CoreSeconds) -> None:
+def test_what_is_listed_is_marked_unless_it_is_measured_anew(timer: CoreSeconds) -> None:
     for relist in (None, "more", "anew"):
         marked: list[str] = []
         items: Any = [

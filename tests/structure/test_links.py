@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # what the commands write is not kept
 WRITTEN = ROOT / "results"
-KEPT = (
+COMMITTED = (
     WRITTEN / "benchmarks",
     *(WRITTEN / name / "README.md" for name in ("", "attack", "changes", "faults", "mutants", "proofs")),
 )
@@ -31,7 +31,7 @@ LINK = re.compile(r"\]\((?!https?:|mailto:)([^)\s]*)\)")
 
 def is_active(path: Path) -> bool:
     below = WRITTEN in path.parents
-    return path.exists() and (not below or any(path == kept or kept in path.parents for kept in KEPT))
+    return path.exists() and (not below or any(path == folder or folder in path.parents for folder in COMMITTED))
 
 
 def anchors(page: Path) -> set[str]:
@@ -63,6 +63,6 @@ def test_pictures_under_docs_are_shown():
 
 
 def test_pages_that_are_kept_are_small():
-    kept = [path for folder in ("docs", "results/benchmarks") for path in (ROOT / folder).rglob("*") if path.is_file()]
-    kept = [path for path in kept if not {"_build", "gallery", "jupyter_execute"} & set(path.parts)]
-    assert sum(path.stat().st_size for path in kept) < 3e6
+    pages = [path for folder in ("docs", "results/benchmarks") for path in (ROOT / folder).rglob("*") if path.is_file()]
+    pages = [path for path in pages if not {"_build", "gallery", "jupyter_execute"} & set(path.parts)]
+    assert sum(path.stat().st_size for path in pages) < 3e6

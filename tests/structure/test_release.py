@@ -85,8 +85,8 @@ def test_a_wheel_carries_its_data(tmp_path: Path) -> None:
     assert any(name.endswith("licenses/LICENSE") for name in names)
     say = "import laufruhe.extensions.beginning.files as b; print(b.__file__); print(b.ready_list())"
     env = {**os.environ, "PYTHONPATH": str(tmp_path / "installed")}
-    told = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", say], cwd=tmp_path, env=env, check=True, capture_output=True, text=True
     )
-    assert str(tmp_path) in told.stdout
-    assert "tractor-four-lanchester" in told.stdout
+    assert str(tmp_path) in process.stdout
+    assert "tractor-four-lanchester" in process.stdout

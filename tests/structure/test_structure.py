@@ -26,8 +26,8 @@ RULES = {
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, set[str]]:
-    kept = once("source-shape", lambda folder: (folder / "found").write_bytes(pickle.dumps(source_shape.measured())))
-    return pickle.loads((kept / "found").read_bytes())
+    cache = once("source-shape", lambda folder: (folder / "found").write_bytes(pickle.dumps(source_shape.measured())))
+    return pickle.loads((cache / "found").read_bytes())
 
 
 @pytest.mark.parametrize("rule", RULES)

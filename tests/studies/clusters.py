@@ -48,8 +48,8 @@ sweep = [{{ quantity = "engine.rod_ratio", from = 0.2, to = 0.3, points = {point
 cases = [{{ name = "single", problem = "single.toml" }}]
 """
 # on a slow machine too schedulers and workers come in time
-_TOLD = "import laufruhe.numerics.cluster as own; own.ANSWERS = own.PATIENCE = 600.0; "
-LAUFRUHE = (sys.executable, "-c", _TOLD + "from laufruhe.cli import main; main()")
+PATIENT_CLIENT = "import laufruhe.numerics.cluster as own; own.ANSWERS = own.PATIENCE = 600.0; "
+LAUFRUHE = (sys.executable, "-c", PATIENT_CLIENT + "from laufruhe.cli import main; main()")
 QUIET = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")  # the usual port may be taken, by another test too
 EACH = ("--nthreads", "1", *QUIET, "--death-timeout", "600")
 _SOURCE = str(Path(laufruhe.__file__).parents[1])
@@ -70,8 +70,8 @@ def prepared(
     folder.mkdir(parents=True, exist_ok=True)
     text = PROBLEM.read_text(encoding="utf-8") + "\n[fidelity]\nsamples = 144\n"
     (folder / "single.toml").write_text(text, encoding="utf-8")
-    told = STUDY.format(draws=draws, chunk=chunk, scenes=scenes, few=few, points=points)
-    (folder / "s.toml").write_text(told, encoding="utf-8")
+    study_text = STUDY.format(draws=draws, chunk=chunk, scenes=scenes, few=few, points=points)
+    (folder / "s.toml").write_text(study_text, encoding="utf-8")
     return folder
 
 

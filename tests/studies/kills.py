@@ -130,14 +130,14 @@ def uninterrupted(folder: Path) -> Whole:
 
 
 @dataclass
-class Told:
+class Log:
     """What was tried, and what went wrong."""
 
     tried: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
 
 
-def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
+def attacked(folder: Path, seed: int, whole: Whole, log: Log) -> None:
     """One study in a new folder: killed up to four times, its kept points damaged, then left alone."""
     rng = random.Random(seed)
     shutil.rmtree(folder, ignore_errors=True)
@@ -145,22 +145,22 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
     for _ in range(rng.randint(1, 4)):
         count, jobs = rng.choice((1, 2)), rng.choice((1, 1, 1, 2))
         running = [started(folder, jobs) for _ in range(count)]
-        told.tried[f"runs of {count} at once, {jobs} core{'s' if jobs > 1 else ''} each"] += 1
-        stopped(running, rng, whole, seed, told)
-        told.tried[f"kept points: {damage(folder / 'out' / FINISHED_POINTS, rng)}"] += 1
+        log.tried[f"runs of {count} at once, {jobs} core{'s' if jobs > 1 else ''} each"] += 1
+        stopped(running, rng, whole, seed, log)
+        log.tried[f"kept points: {damage(folder / 'out' / FINISHED_POINTS, rng)}"] += 1
     last = started(folder)
     said = last.communicate()[1]
     left = sorted(path.name for path in folder.glob(".unfinished-*"))
     if left:
-        told.wrong.append(f"seed {seed}: {', '.join(left)} left behind")
+        log.wrong.append(f"seed {seed}: {', '.join(left)} left behind")
     if last.returncode or said:
-        told.wrong.append(f"seed {seed}: the last run ended with {last.returncode}: {said[-300:]}")
+        log.wrong.append(f"seed {seed}: the last run ended with {last.returncode}: {said[-300:]}")
     elif results(folder) != whole.files:
         names = {name for name, data in results(folder).items() ^ whole.files.items()}
-        told.wrong.append(f"seed {seed}: {', '.join(sorted(names))} differ")
+        log.wrong.append(f"seed {seed}: {', '.join(sorted(names))} differ")
 
 
-def stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole: Whole, seed: int, told: Told) -> None:
+def stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole: Whole, seed: int, log: Log) -> None:
     """Each by a signal of its own, at a moment of its own: mostly while points are kept or files are written."""
     began, slower = time.monotonic(), len(running) ** 0.3
     moments = []
@@ -170,7 +170,7 @@ def stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole:
     moments.sort(key=lambda one: one[0])
     for moment, stop, process in moments:
         time.sleep(max(0.0, began + moment - time.monotonic()))
-        told.tried[f"{stop.name} {'sent' if process.poll() is None else 'too late'}"] += 1
+        log.tried[f"{stop.name} {'sent' if process.poll() is None else 'too late'}"] += 1
         process.send_signal(stop)
     for _, stop, process in moments:
         said = process.communicate()[1]
@@ -179,4 +179,4 @@ def stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole:
         importing = stop is not signal.SIGKILL and ("import" in said or "Exception ignored" in said)
         allowed = {0, -stop, *(() if stop is signal.SIGKILL else (130,))}
         if not importing and (process.returncode not in allowed or "Traceback" in said):
-            told.wrong.append(f"seed {seed}: {stop.name} ended with {process.returncode}: {said[-300:]}")
+            log.wrong.append(f"seed {seed}: {stop.name} ended with {process.returncode}: {said[-300:]}")

@@ -24,7 +24,7 @@ def part_of(folder: Path, text: str) -> xr.Dataset:
     return next(iter(datasets.values()))
 
 
-def told(kind: str, data: xr.Dataset) -> str:
+def text_of_study(kind: str, data: xr.Dataset) -> str:
     """Return the tables of a part as Markdown."""
     blocks = tuple(block for text in KINDS[kind].table(data) for block in blocks_of(text))
     return Document("part", blocks).as_markdown(".png")

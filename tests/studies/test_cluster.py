@@ -42,13 +42,13 @@ def test_killed_clients_workers_and_schedulers_change_no_bit(
     clusters.wait_until(lambda: clusters.pieces_done(folder) >= KILLED_AT or first.poll() is not None)
     first.kill()
     first.communicate()
-    kept = clusters.pieces_done(folder)
-    assert kept >= KILLED_AT
+    finished = clusters.pieces_done(folder)
+    assert finished >= KILLED_AT
     again = clusters.started(folder, "--scheduler", workers.address)
-    clusters.wait_until(lambda: clusters.pieces_done(folder) > kept or again.poll() is not None)
+    clusters.wait_until(lambda: clusters.pieces_done(folder) > finished or again.poll() is not None)
     # what it has in hand falls to the other
     workers.kill_worker(0)
-    clusters.wait_until(lambda: clusters.pieces_done(folder) > kept + 1 or again.poll() is not None)
+    clusters.wait_until(lambda: clusters.pieces_done(folder) > finished + 1 or again.poll() is not None)
     workers.kill()
     workers.start(1)
     said = again.communicate()[1]

@@ -17,7 +17,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> kills.Whole:
 
 @pytest.mark.parametrize("seed", first_fast(range(4), 0, long=(0, 1, 3)))
 def test_results_are_those_of_one_run(tmp_path: Path, seed: int, whole: kills.Whole) -> None:
-    told = kills.Told()
-    kills.attacked(tmp_path / "s", seed, whole, told)
-    assert told.wrong == []
+    log = kills.Log()
+    kills.attacked(tmp_path / "s", seed, whole, log)
+    assert log.wrong == []
     assert set(whole.files) >= {"report.md", "fraction.nc", "fraction.csv", "fraction.svg", "map.nc"}

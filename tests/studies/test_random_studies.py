@@ -86,8 +86,8 @@ def fits(kind: str, tables: dict[str, Any]) -> bool:
     objective = tables["objective"]
     # what comes first in an order of rank is what a study measures
     first = objective[0] if isinstance(objective, list) else objective
-    asked = first.get("minimise") or first["terms"][0]["quantity"]
-    loads = not any(word in asked for word in ("sag", "torque", "flywheel"))
+    quantity = first.get("minimise") or first["terms"][0]["quantity"]
+    loads = not any(word in quantity for word in ("sag", "torque", "flywheel"))
     if kind == "balancer sizing":
         return loads and "balancer_shafts" in tables
     if kind == "counterweight fraction":

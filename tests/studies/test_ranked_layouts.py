@@ -33,9 +33,9 @@ def tables(name: str) -> dict[str, Any]:
 
 
 def problem(name: str, cylinders: int, **more: Any) -> Problem:
-    told = tables(name)
-    told["engine"] |= {"cylinders": cylinders}
-    return load_tables({**told, **more}, Path(f"{name}.toml"))
+    settings = tables(name)
+    settings["engine"] |= {"cylinders": cylinders}
+    return load_tables({**settings, **more}, Path(f"{name}.toml"))
 
 
 @pytest.mark.slow
@@ -54,10 +54,10 @@ def test_an_open_crank_is_decided_in_its_new_size() -> None:
 @pytest.fixture(scope="module")
 def data() -> xr.Dataset:
     """Three engines of the ready study."""
-    told = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
-    wanted = ("in line 6", "boxer 2", "radial 3")
-    told["cases"] = [case for case in told["cases"] if case["name"] in wanted]
-    part, problem_files = LayoutComparison.model_validate(told), ProblemFiles(PROBLEMS)
+    part_table = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
+    layouts = ("in line 6", "boxer 2", "radial 3")
+    part_table["cases"] = [case for case in part_table["cases"] if case["name"] in layouts]
+    part, problem_files = LayoutComparison.model_validate(part_table), ProblemFiles(PROBLEMS)
     points = part.points(problem_files)
     return part.dataset(points, [part.answer(point, problem_files) for point in points])
 
@@ -101,8 +101,8 @@ def test_the_page_has_a_row_and_the_picture_a_panel_for_each(data: xr.Dataset) -
 
 
 def test_the_ready_study_has_every_layout_from_one_to_twelve_cylinders() -> None:
-    told = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
-    part, problem_files = LayoutComparison.model_validate(told), ProblemFiles(PROBLEMS)
+    part_table = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
+    part, problem_files = LayoutComparison.model_validate(part_table), ProblemFiles(PROBLEMS)
     engines = [problem_files.problem(point).engine for point in part.points(problem_files)]
     assert len(engines) == 33
     assert {case.equal_power_to for case in part.cases} == {4}

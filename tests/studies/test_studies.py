@@ -68,8 +68,8 @@ def swept(quantity: str, text: str) -> str:
     return f'[[study.parts.sweep]]\nquantity = "{quantity}"\n{text}\n'
 
 
-def computed(path: Path, folder: Path = PROBLEMS, jobs: int = 1, kept: Path | None = None) -> xr.Dataset:
-    return run(load_study(path), folder, kept or path.parent / "kept" / FINISHED_POINTS, jobs=jobs)[0]["p"]
+def computed(path: Path, folder: Path = PROBLEMS, jobs: int = 1, points_file: Path | None = None) -> xr.Dataset:
+    return run(load_study(path), folder, points_file or path.parent / "kept" / FINISHED_POINTS, jobs=jobs)[0]["p"]
 
 
 def points_in(content: bytes) -> set[str]:
@@ -199,8 +199,8 @@ def test_designs_are_ranked_by_further_quantities(tmp_path: Path) -> None:
     for k, name in enumerate(("boxer-four", "vee-six-90")):
         result = ready.solved(name)
         for j, quantity in enumerate(data["quantity"].values.tolist()):
-            wanted = result.final.value(Measure(*MEASURES[quantity]))
-            assert data["further"].values[k, j] == pytest.approx(wanted, rel=1e-6, abs=1e-9)
+            expected = result.final.value(Measure(*MEASURES[quantity]))
+            assert data["further"].values[k, j] == pytest.approx(expected, rel=1e-6, abs=1e-9)
     *_, words, ranking = LayoutComparison.table(data)
     assert "Ranked" in words
     assert ranking.rows[0][0] == (
@@ -252,23 +252,23 @@ def test_a_scene_of_two_names_is_solved_once_and_shown_twice(tmp_path: Path) -> 
 def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     force = Limit("force", problem.objective[0].measure, 1.0)
-    kept = solve_scene(replace(problem, limits=(force,)))
-    assert (kept["status"], kept["proof"]) == ("infeasible", "none")
-    assert kept["objective_given"] == pytest.approx(893.3, abs=0.1)
-    assert np.isnan([kept["objective"], kept["lower_bound"], *kept["mean"].values()]).all()
+    record = solve_scene(replace(problem, limits=(force,)))
+    assert (record["status"], record["proof"]) == ("infeasible", "none")
+    assert record["objective_given"] == pytest.approx(893.3, abs=0.1)
+    assert np.isnan([record["objective"], record["lower_bound"], *record["mean"].values()]).all()
 
 
 def test_goes_on_from_a_file_cut_anywhere(tmp_path: Path, small: Path) -> None:
     path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(5)))
-    kept = tmp_path / "kept" / FINISHED_POINTS
-    whole = computed(path, small, kept=kept)
-    content = kept.read_bytes()
+    points_file = tmp_path / "kept" / FINISHED_POINTS
+    whole = computed(path, small, points_file=points_file)
+    content = points_file.read_bytes()
     assert len(points_in(content)) == 5
     cut = tmp_path / "cut" / FINISHED_POINTS
     cut.parent.mkdir()
     for length in (1, len(content) // 2, len(content) - 1):
         cut.write_bytes(content[:length])
-        assert computed(path, small, kept=cut).identical(whole)
+        assert computed(path, small, points_file=cut).identical(whole)
         assert points_in(cut.read_bytes()) == points_in(content)
 
 
@@ -379,20 +379,20 @@ def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals
     out = tmp_path / "out"
     command = [sys.executable, "-c", HALTS, "study", str(path), "--out", str(out), "--jobs", "1"]
     # a test run in the background has its interrupts ignored, and hands that on
-    heard = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
+    restore = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    process = subprocess.Popen(command, env=environment, text=True, preexec_fn=heard, **pipes)  # type: ignore[call-overload]
+    process = subprocess.Popen(command, env=environment, text=True, preexec_fn=restore, **pipes)  # type: ignore[call-overload]
     assert process.stdout.readline() == "three\n"
     process.send_signal(stop)
     said = process.communicate()[1]
-    kept = out / FINISHED_POINTS
-    content = kept.read_bytes()
+    points_file = out / FINISHED_POINTS
+    content = points_file.read_bytes()
     assert len(points_in(content)) == 3
     if stop is signal.SIGINT:
         assert process.returncode == 130
         assert said == "laufruhe: interrupted; finished points are kept, the same command goes on\n"
-    data = computed(path, tmp_path, kept=kept)
-    assert kept.read_bytes().startswith(content)
+    data = computed(path, tmp_path, points_file=points_file)
+    assert points_file.read_bytes().startswith(content)
     assert data.identical(whole)
 
 

@@ -278,11 +278,11 @@ def test_an_open_stroke_is_decided_at_equal_power() -> None:
     problem, fixed = load(text), load(text.replace('{ between = ["80 mm", "160 mm"], start = "120 mm" }', '"150 mm"'))
     names = [decision.name for decision in problem.decisions]
     values = [0.15 if name == "engine.stroke" else start for name, start in zip(names, problem.start, strict=True)]
-    built, wanted = at_equal_power(problem, 4).fixed_at(values), at_equal_power(fixed, 4)
-    (part,), (resized,) = built.engine.slider_cranks, wanted.engine.slider_cranks
+    built, expected = at_equal_power(problem, 4).fixed_at(values), at_equal_power(fixed, 4)
+    (part,), (resized,) = built.engine.slider_cranks, expected.engine.slider_cranks
     assert (part.bore, part.stroke) == pytest.approx((0.2, 0.3))
     assert part.reciprocating_mass == pytest.approx(resized.reciprocating_mass)
-    assert built.points[0].speed == pytest.approx(wanted.points[0].speed)
+    assert built.points[0].speed == pytest.approx(expected.points[0].speed)
 
 
 @pytest.mark.parametrize(("name", "setting", "left_out"), [
@@ -368,16 +368,16 @@ def test_a_limit_has_the_name_that_results_show() -> None:
 
 def test_forces_by_order_and_prices_of_limits_are_kept() -> None:
     result = scenes.solved(scenes.TIGHT)
-    kept = solve_scene(result.problem)
+    record = solve_scene(result.problem)
     limit = result.limits[0]
-    assert kept["shadow_price"] == {limit.name: pytest.approx(limit.shadow_price, rel=1e-3)}
-    assert kept["limit_units"] == {"balancer mass": "kg"}
+    assert record["shadow_price"] == {limit.name: pytest.approx(limit.shadow_price, rel=1e-3)}
+    assert record["limit_units"] == {"balancer mass": "kg"}
     forces = result.final.loads[0].mount_forces
     assert forces is not None
     second = np.linalg.norm(forces.at(2.0)[:, 1:], axis=1)
-    assert np.mean(second) >= kept["order_force"]["2"] > 0.5 * np.mean(second)
-    assert kept["order_force_given"]["2"] > kept["order_force"]["2"]
-    data = dataset([Point(CaseTable(name="a", problem="a.toml"))], [kept], {}, {})
-    assert data["shadow_price"].sel(limit="balancer mass").item() == kept["shadow_price"]["balancer mass"]
+    assert np.mean(second) >= record["order_force"]["2"] > 0.5 * np.mean(second)
+    assert record["order_force_given"]["2"] > record["order_force"]["2"]
+    data = dataset([Point(CaseTable(name="a", problem="a.toml"))], [record], {}, {})
+    assert data["shadow_price"].sel(limit="balancer mass").item() == record["shadow_price"]["balancer mass"]
     assert data["price_unit"].values.tolist() == ["N per kg"]
     assert 2.0 in data["order"].values

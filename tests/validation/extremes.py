@@ -351,7 +351,7 @@ def no_damping_at_resonance() -> Entry:
         "damping 0, driven at a natural frequency",
         "the limit is infinite",
         "refused with the mode's name and a remedy within 1e-8 of the frequency squared; other modes are answered",
-        float(sum(not kept for kept in refused)),
+        float(sum(not allowed for allowed in refused)),
         0.0,
     )
 

@@ -262,14 +262,14 @@ def simulate(
     model = build(machine, -math.tau * run_in / steps)
     integrate(model, steps, run_in + turns * steps, integrator)
     angles = math.tau * np.arange(turns * steps) / steps
-    kept = slice(run_in, run_in + turns * steps)
+    selection = slice(run_in, run_in + turns * steps)
     # a multiplier is what its constraint exerts on the first of two markers, here the ground
-    torques = [(ratio, -_read(model, sensor, kept)[:, 0]) for ratio, sensor in model.drives]
-    reactions = _reactions(model, torques, kept) + _gas_wrench(machine, angles)
+    torques = [(ratio, -_read(model, sensor, selection)[:, 0]) for ratio, sensor in model.drives]
+    reactions = _reactions(model, torques, selection) + _gas_wrench(machine, angles)
     # what a bearing holds does not move; a wall does, with its piston
     held = [support for support in model.supports if isinstance(support.place, complex)]
-    bearings = [support.frame * _plane(model, support.sensor, kept) for support in held]
-    return Loads(angles, reactions, _momentum(model, torques, kept), np.stack(bearings, axis=1))
+    bearings = [support.frame * _plane(model, support.sensor, selection) for support in held]
+    return Loads(angles, reactions, _momentum(model, torques, selection), np.stack(bearings, axis=1))
 
 
 def build(machine: Machine, start: float) -> _Model:
@@ -419,27 +419,27 @@ def _sensor(model: _Model, kind: Callable[..., Any], number: int, what: Any) -> 
 # loads
 
 
-def _reactions(model: _Model, torques: list[tuple[float, FloatArray]], kept: slice) -> FloatArray:
+def _reactions(model: _Model, torques: list[tuple[float, FloatArray]], steps: slice) -> FloatArray:
     """Forces of bearings and walls on the block, and what gears add.
 
     A drive holds its body at speed from outside the block. That is the flywheel's work for the crank; a shaft of ratio
     n has its torque from the crank by gears, which take n times as much from it, and the block bears the difference.
     """
-    total = np.zeros((kept.stop - kept.start, 6))
+    total = np.zeros((steps.stop - steps.start, 6))
     for support in model.supports:
-        force = support.frame * _plane(model, support.sensor, kept)
-        total += _wrench(support.x, _places(model, support.place, kept), force)
+        force = support.frame * _plane(model, support.sensor, steps)
+        total += _wrench(support.x, _places(model, support.place, steps), force)
     total[:, 3] -= sum((ratio - 1.0) * torque for ratio, torque in torques)
     return total
 
 
-def _momentum(model: _Model, torques: list[tuple[float, FloatArray]], kept: slice) -> FloatArray:
+def _momentum(model: _Model, torques: list[tuple[float, FloatArray]], steps: slice) -> FloatArray:
     """What block and flywheel give the bodies in momentum, less the flywheel's torque, turned round."""
-    total = np.zeros((kept.stop - kept.start, 6))
+    total = np.zeros((steps.stop - steps.start, 6))
     for body in model.bodies:
-        force = -body.mass * _plane(model, body.acceleration, kept)
-        total += _wrench(body.x, _places(model, body.position, kept), force)
-        total[:, 3] += body.inertia * _read(model, body.spin, kept)[:, 2]
+        force = -body.mass * _plane(model, body.acceleration, steps)
+        total += _wrench(body.x, _places(model, body.position, steps), force)
+        total[:, 3] += body.inertia * _read(model, body.spin, steps)[:, 2]
     total[:, 3] -= sum(ratio * torque for ratio, torque in torques)
     return total
 
@@ -462,17 +462,17 @@ def _wrench(x: float, place: complex | ComplexArray, force: ComplexArray) -> Flo
     return np.stack([np.zeros(len(force)), lateral, vertical, roll, -x * vertical, x * lateral], axis=1)
 
 
-def _places(model: _Model, place: int | complex, kept: slice) -> complex | ComplexArray:
-    return _plane(model, place, kept) if isinstance(place, int) else place
+def _places(model: _Model, place: int | complex, steps: slice) -> complex | ComplexArray:
+    return _plane(model, place, steps) if isinstance(place, int) else place
 
 
-def _plane(model: _Model, sensor: int, kept: slice) -> ComplexArray:
-    data = _read(model, sensor, kept)
+def _plane(model: _Model, sensor: int, steps: slice) -> ComplexArray:
+    data = _read(model, sensor, steps)
     return np.asarray(data[:, 0] + 1j * data[:, 1])
 
 
-def _read(model: _Model, sensor: int, kept: slice) -> FloatArray:
-    return np.asarray(model.system.GetSensorStoredData(sensor)[kept, 1:])
+def _read(model: _Model, sensor: int, steps: slice) -> FloatArray:
+    return np.asarray(model.system.GetSensorStoredData(sensor)[steps, 1:])
 
 
 def _dot(a: complex, b: complex) -> float:

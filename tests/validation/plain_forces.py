@@ -57,7 +57,7 @@ class PlainEngine:
         """Mount forces with all numbers computed, shape (samples, mounts, 3) [N]."""
         return self.on_mounts(speed**2 * self._inertia(rod_ratio) + self._gas(rod_ratio) + self.turning(speed))
 
-    def kept(self, rod_ratio: float) -> Callable[[float], FloatArray]:
+    def truncated(self, rod_ratio: float) -> Callable[[float], FloatArray]:
         """Mount forces as a function of speed that keeps inertia, gas and unbalances at unit speed."""
         at_unit_speed, gas = self._inertia(rod_ratio) + self.turning(1.0), self._gas(rod_ratio)
         return lambda speed: self.on_mounts(speed**2 * at_unit_speed + gas)

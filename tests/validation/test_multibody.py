@@ -254,8 +254,8 @@ def unit_loads(name: str) -> FloatArray:
     return np.maximum(in_phase, np.abs(simulated(name, FINE).reactions).max(axis=0))
 
 
-def error(name: str, got: FloatArray, wanted: FloatArray) -> float:
-    return float((np.abs(got - wanted) / unit_loads(name)).max())
+def error(name: str, got: FloatArray, expected: FloatArray) -> float:
+    return float((np.abs(got - expected) / unit_loads(name)).max())
 
 
 def own_error(name: str) -> float:

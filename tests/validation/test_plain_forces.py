@@ -29,4 +29,4 @@ def test_mount_forces_of_a_four_cylinder(with_gas: bool, rod_ratio: float, speed
     plain = plain_engine(engine, point, SAMPLES)
     largest = np.abs(forces).max()
     assert np.abs(forces - plain.forces(rod_ratio, speed)).max() < 1e-9 * largest
-    assert np.abs(forces - plain.kept(rod_ratio)(speed)).max() < 1e-9 * largest
+    assert np.abs(forces - plain.truncated(rod_ratio)(speed)).max() < 1e-9 * largest

@@ -80,16 +80,16 @@ def test_an_open_mass_may_start_anywhere() -> None:
     assert load(text).plausibility_warnings == ()
 
 
-@pytest.mark.parametrize("told", ["", "firing_order = [1, 10, 5, 7, 2, 8, 3, 9, 4, 6]", "fires_together = true"])
-def test_throws_without_a_firing_order_are_asked_about(told: str) -> None:
+@pytest.mark.parametrize("order_line", ["", "firing_order = [1, 10, 5, 7, 2, 8, 3, 9, 4, 6]", "fires_together = true"])
+def test_throws_without_a_firing_order_are_asked_about(order_line: str) -> None:
     """A V10 whose throws leave every cylinder at its first dead centre: all fire in one turn of two."""
     vee = 'layout = "vee"\nbank_angle = 90\ncylinder_spacing = "98 mm"'
     engine = SINGLE.replace('layout = "inline"', vee).replace(
-        "throws = [0]", f"throws = [45, 117, 333, 189, 261]\n{told}"
+        "throws = [0]", f"throws = [45, 117, 333, 189, 261]\n{order_line}"
     )
     found = [str(doubt) for doubt in load(engine).plausibility_warnings]
-    assert found == ([] if told else [found[0]])
-    assert told or found[0].startswith(
+    assert found == ([] if order_line else [found[0]])
+    assert order_line or found[0].startswith(
         "firing: takes place in all 10 cylinders within one of the two turns of the cycle; give a firing order"
     )
 

@@ -32,8 +32,8 @@ def test_every_ready_problem_has_a_use() -> None:
 
 
 def test_the_wheel_carries_them() -> None:
-    told = tomllib.loads((PROBLEMS.parent / "pyproject.toml").read_text(encoding="utf-8"))
-    assert told["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {"problems": "laufruhe/problems"}
+    project = tomllib.loads((PROBLEMS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"] == {"problems": "laufruhe/problems"}
 
 
 @pytest.mark.parametrize("name", ["bmw-b48", "tractor-single"])

@@ -88,10 +88,10 @@ def masses(part: CrankRocker) -> list[moving.Mass]:
 )  # fmt: skip
 def test_loads_are_those_of_its_masses(part: CrankRocker) -> None:
     loads = shaking_loads(Engine("one", Cycle.TWO_STROKE, (part,)), AT).sample(moving.STEPS)
-    wanted = moving.wrench(masses(part), SPEED)
-    size = np.abs(wanted).max()
-    assert pytest.approx(wanted, abs=1e-9 * size) == loads[:, [1, 2, 3]].T
-    assert pytest.approx(part.x * np.array([-wanted[1], wanted[0]]), abs=1e-9 * size) == loads[:, 4:].T
+    expected = moving.wrench(masses(part), SPEED)
+    size = np.abs(expected).max()
+    assert pytest.approx(expected, abs=1e-9 * size) == loads[:, [1, 2, 3]].T
+    assert pytest.approx(part.x * np.array([-expected[1], expected[0]]), abs=1e-9 * size) == loads[:, 4:].T
 
 
 def test_torque_is_what_the_energy_loses() -> None:

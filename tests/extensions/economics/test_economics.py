@@ -206,8 +206,8 @@ def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
 @pytest.mark.parametrize(("mass", "fall"), [(1.25, 0.152), (2.25, 0.308)])
 def test_shaft_of_three_cylinders_by_mass(mass: float, fall: float) -> None:
     """Barely over W2 with the printed mass, clearly with the other."""
-    told = {"engine.reciprocating_mass": f"{mass} kg", "gas.imep": "9 kp/cm^2"}
-    problem = ProblemFiles(PROBLEMS).problem(Point(CaseTable(name="three", problem="tractor-three.toml", set=told)))
+    changes = {"engine.reciprocating_mass": f"{mass} kg", "gas.imep": "9 kp/cm^2"}
+    problem = ProblemFiles(PROBLEMS).problem(Point(CaseTable(name="three", problem="tractor-three.toml", set=changes)))
     found = 1.0 - best(problem).force / best(with_shafts(problem, ())).force
     assert found == pytest.approx(fall, abs=0.002)
 

@@ -62,8 +62,8 @@ def test_economics_by_its_command(tmp_path: Path) -> None:
     assert "| first order: against plain (Fig. 17) | noticeable | -15.2 % of the force | yes |" in report
     assert "five cylinders, no shafts, equal power" in report
     assert len((out / "three.csv").read_text(encoding="utf-8").splitlines()) == 1 + 3 * 2
-    told = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))
-    assert told["parts"]["three"]["attrs"]["kind"] == "economics"
+    record = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))
+    assert record["parts"]["three"]["attrs"]["kind"] == "economics"
 
 
 SHAFT = """

@@ -76,10 +76,10 @@ def test_trade_of_several_tells_each_by_its_name(tmp_path: Path) -> None:
     answer = RUN.invoke(app, ["trade", *map(str, paths), "--out", str(tmp_path / "trade"), "--json", str(out)])
     assert answer.exit_code == 0, answer.output
     assert "|" not in answer.output
-    told = json.loads(out.read_text(encoding="utf-8"))
-    assert [one["problem"] for one in told] == ["given", "open"]
-    assert [one["reference"]["optimum"] is None for one in told] == [True, False]
-    for one, path in zip(told, paths, strict=True):
+    report = json.loads(out.read_text(encoding="utf-8"))
+    assert [one["problem"] for one in report] == ["given", "open"]
+    assert [one["reference"]["optimum"] is None for one in report] == [True, False]
+    for one, path in zip(report, paths, strict=True):
         assert one["reference"]["objective"] == pytest.approx(laufruhe.evaluate(path).objective.value, rel=1e-3)
         assert one["problem"] in (tmp_path / f"trade/{path.stem}.md").read_text(encoding="utf-8")
 

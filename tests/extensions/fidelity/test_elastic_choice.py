@@ -144,13 +144,13 @@ def test_a_question_about_modes_needs_no_loads() -> None:
 @pytest.mark.parametrize("damped", [{}, {"loss_factor": 0.0, "damping": (900.0, 900.0, 900.0)}])
 def test_a_transmissibility_needs_its_loads(damped: dict[str, Any]) -> None:
     problem = load(PROBLEMS / "powertrain-torque-roll.toml")
-    asked = (*problem.load_terms, Term(Measure(channels.TRANSMISSIBILITY)))
+    objective = (*problem.load_terms, Term(Measure(channels.TRANSMISSIBILITY)))
     engine = replace(problem.engine, mounts=tuple(replace(mount, **damped) for mount in problem.engine.mounts))
-    choice = needs(replace(problem, engine=engine, objective=asked, limits=problem.load_limits))
-    kept = " ".join(choice.description)
-    assert "gas" in kept
-    assert "crank speed" in kept
-    assert "loss and damping" in kept
+    choice = needs(replace(problem, engine=engine, objective=objective, limits=problem.load_limits))
+    text = " ".join(choice.description)
+    assert "gas" in text
+    assert "crank speed" in text
+    assert "loss and damping" in text
 
 
 def test_stiff_mounts_are_rigid_ones() -> None:

@@ -152,17 +152,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--number", type=int, default=300, help="of engines")
     parser.add_argument("--noise", type=float, default=0.05)
-    told = parser.parse_args()
+    arguments = parser.parse_args()
     found: list[bool] = []
     lost = 0
-    for seed in range(told.number):
+    for seed in range(arguments.number):
         truth = engine(seed)
-        answer = estimate(measured(truth, np.random.default_rng(seed + 10_000), told.noise))
+        answer = estimate(measured(truth, np.random.default_rng(seed + 10_000), arguments.noise))
         inside = hits(truth, answer)
         found += inside
         lost += sum(d.width for d in answer.domains) - len(inside)
     share = np.mean(found)
-    print(f"{told.number} engines: {share:.2%} of {len(found)} intervals hold the true number, {lost} at a bound")
+    print(f"{arguments.number} engines: {share:.2%} of {len(found)} intervals hold the true number, {lost} at a bound")
     sys.exit(not 0.93 <= share <= 0.97)
 
 

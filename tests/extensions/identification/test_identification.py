@@ -197,11 +197,11 @@ def test_python_identifies_as_the_command_does(tmp_path: Path) -> None:
     answer = lr.identify(path)
     assert CliRunner().invoke(app, ["identify", str(path), "--out", str(tmp_path / "out"), "--quiet"]).exit_code == 0
     tmp_path /= "out"
-    told = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
-    assert json.loads(answer.to_json()) == told
+    data = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert json.loads(answer.to_json()) == data
     size = answer.numbers.loc["crank.pulley.unbalance"]
     assert size["from"] < size["estimate"] < size["to"]
     assert answer.identified.to_toml() == (tmp_path / "identified.toml").read_text(encoding="utf-8")
-    assert dict(answer.unexplained) == {one["file"]: one["unexplained"] for one in told["measurements"]}
+    assert dict(answer.unexplained) == {one["file"]: one["unexplained"] for one in data["measurements"]}
     with pytest.raises(InputError, match="measurements: is missing"):
         lr.identify(PROBLEMS / "tractor-single.toml")

@@ -49,10 +49,10 @@ def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: i
     for (maximum, norm), z in zip(again.limits, used.limits, strict=True):
         rows += np.vdot(z, norm.rows(u)) - norm.dual_norm(z) * maximum
     loop, orders = mount_loop(problem, loads.orders.omegas, other, other), loads.orders
-    felt = orders.loads[:, 0] + np.einsum("c,wci->wi", u, orders.loads[:, 1:])
+    total_loads = orders.loads[:, 0] + np.einsum("c,wci->wi", u, orders.loads[:, 1:])
     by_orders = pairing.constant + pairing.slopes @ u
     for duals, maps in ((pairing.forces, loop.forces), (pairing.travels, loop.travels)):
-        by_orders += np.einsum("wr,wri,wi->", duals.conj(), maps[0], felt).real
+        by_orders += np.einsum("wr,wri,wi->", duals.conj(), maps[0], total_loads).real
     assert by_orders == pytest.approx(rows, rel=1e-9)
 
 
@@ -92,7 +92,7 @@ def test_what_multipliers_say_in_a_box_is_a_polynomial_and_a_rest(seed: int) -> 
         pairing = boxes.corner(lower).pairing
         columns = boxes.corner(lower).columns
         loaded = boxes.loaded(boxes.balanced_loop(lower, upper), columns)
-        told, rest = boxes.expanded(pairing, loaded, columns)
+        polynomial, rest = boxes.expanded(pairing, loaded, columns)
         if not np.isfinite(rest).all():
             continue
         for mounts in generator.uniform(lower, upper, (8, len(lower))):
@@ -103,11 +103,11 @@ def test_what_multipliers_say_in_a_box_is_a_polynomial_and_a_rest(seed: int) -> 
                     s[j] = math.tan(half * s[j]) / math.tan(half)
             u = columns + generator.normal(size=len(columns))
             loop = mount_loop(problem, boxes.loads.orders.omegas, mounts, mounts)
-            felt = boxes.loads.orders.loads[:, 0] + np.einsum("c,wci->wi", u, boxes.loads.orders.loads[:, 1:])
+            loads = boxes.loads.orders.loads[:, 0] + np.einsum("c,wci->wi", u, boxes.loads.orders.loads[:, 1:])
             true = pairing.constant + pairing.slopes @ u
             for duals, maps in ((pairing.forces, loop.forces), (pairing.travels, loop.travels)):
-                true += np.einsum("wr,wri,wi->", duals.conj(), maps[0], felt).real
-            by = told @ np.concatenate([[1.0], s, np.outer(s, s).ravel()])
+                true += np.einsum("wr,wri,wi->", duals.conj(), maps[0], loads).real
+            by = polynomial @ np.concatenate([[1.0], s, np.outer(s, s).ravel()])
             apart = np.append(1.0, u - columns)
             room = float(rest.sum(axis=0) @ np.abs(apart))
             assert abs(true - by @ apart) <= room + 1e-9 * abs(true)
@@ -134,10 +134,10 @@ def test_the_least_over_unbalances_is_that_of_their_sets() -> None:
 @pytest.mark.parametrize("seed", first_fast(SEEDS[:6], 0, 2))
 def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
     problem, generator = joint(seed), np.random.default_rng(seed)
-    boxes, told = DesignBoxes(problem, math.inf, lambda *_: math.inf), 0
+    boxes, informative = DesignBoxes(problem, math.inf, lambda *_: math.inf), 0
     for lower, upper in boxes_of(problem, generator, 6, 0.08):
         bound = float(boxes.bounds(lower[None], upper[None])[0][0])
-        told += bound > 0.0
+        informative += bound > 0.0
         for mounts in generator.uniform(lower, upper, (4, len(lower))):
             at = boxes.loads.at(mounts)
             columns, _ = best_at(at)
@@ -147,7 +147,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
                 design = design_at_start(problem, (mounts.tolist(), inside))
                 if design is not None and design.violation <= 0.0:
                     assert bound <= design.value * (1.0 + 1e-7)
-    assert told >= 2
+    assert informative >= 2
 
 
 def test_a_budget_of_corners_that_is_spent_asks_for_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,7 +197,7 @@ def test_what_is_asked_may_be_crossed(kind: str) -> None:
     table["operating_points"] = [first, {"name": "faster", "speed": "160 rad/s", "weight": 0.7}]
     problem = laufruhe.load(table)
     assert mixes_corners(problem)
-    boxes, told = DesignBoxes(problem, math.inf, lambda *_: math.inf), 0
+    boxes, informative = DesignBoxes(problem, math.inf, lambda *_: math.inf), 0
     for lower, upper in boxes_of(problem, rng, 1, 0.05):
         bound = float(boxes.bounds(lower[None], upper[None])[0][0])
         for mounts in rng.uniform(lower, upper, (4, len(lower))):
@@ -205,12 +205,12 @@ def test_what_is_asked_may_be_crossed(kind: str) -> None:
             columns, multipliers = best_at(at)
             design = design_at_start(problem, (mounts.tolist(), columns))
             if design is not None and design.violation <= 0.0:
-                told += bound > 0.5 * design.value
+                informative += bound > 0.5 * design.value
                 assert bound <= design.value * (1.0 + 1e-7)
             # widened limits have multipliers too, which are so of any unbalances
             u = np.concatenate([d.project(rng.normal(size=d.width) * d.scale) for d in at.domains])
             assert lower_bound(at, multipliers).value <= at.objective(u) or at.violation(u) > 0.0
-    assert told
+    assert informative
 
 
 def test_a_price_lifts_the_least_as_far_as_a_limit_allows() -> None:

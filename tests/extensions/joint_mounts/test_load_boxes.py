@@ -124,8 +124,8 @@ def test_a_ratio_beside_a_force_keeps_all_orders(tmp_path: Path) -> None:
     limit = '[[constraints]]\nlimit = "rms mount force"\nmax = "1e9 N"\n'
     left_out = []
     for minimised in ("transmissibility", "rms mount force"):
-        asked = f'[objective]\nminimise = "{minimised}"\n'
-        problem = with_default_sampling(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked, limit))
+        objective = f'[objective]\nminimise = "{minimised}"\n'
+        problem = with_default_sampling(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, limit))
         boxes = LoadBoxes(problem, 1e9)
         left_out.append(len(MountedLoads(problem).orders.orders) - len(boxes._orders.orders))
         near = np.array([d.start for d in problem.mount_decisions])

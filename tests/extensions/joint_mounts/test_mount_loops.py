@@ -42,8 +42,8 @@ def boxes_of(
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_no_value_of_a_polynomial_is_outside_of_its_coefficients(count: int) -> None:
     generator, ends = np.random.default_rng(count), corners_of(count)
-    told = generator.normal(size=(2**count, 1 + count + count**2))
-    whole = np.einsum("vkp,kp->v", mixed(count), told)
+    polynomials = generator.normal(size=(2**count, 1 + count + count**2))
+    whole = np.einsum("vkp,kp->v", mixed(count), polynomials)
 
     def powers(s: np.ndarray) -> np.ndarray:
         return np.concatenate([[1.0], s, np.outer(s, s).ravel()])
@@ -51,11 +51,11 @@ def test_no_value_of_a_polynomial_is_outside_of_its_coefficients(count: int) -> 
     for s in generator.uniform(-1.0, 1.0, (50, count)):
         shares = np.prod(0.5 * (1.0 + ends * s), axis=1)
         assert shares.sum() == pytest.approx(1.0)
-        assert whole.min() - 1e-12 <= shares @ told @ powers(s) <= whole.max() + 1e-12
-        alone = coefficients(count) @ told[0]
-        assert alone.min() - 1e-12 <= told[0] @ powers(s) <= alone.max() + 1e-12
+        assert whole.min() - 1e-12 <= shares @ polynomials @ powers(s) <= whole.max() + 1e-12
+        alone = coefficients(count) @ polynomials[0]
+        assert alone.min() - 1e-12 <= polynomials[0] @ powers(s) <= alone.max() + 1e-12
     at_ends = whole.reshape((4,) * count)[tuple(np.ix_(*[[0, 3]] * count))].ravel()
-    assert at_ends == pytest.approx([row @ powers(end) for row, end in zip(told, ends, strict=True)])
+    assert at_ends == pytest.approx([row @ powers(end) for row, end in zip(polynomials, ends, strict=True)])
 
 
 TURNED_LEFT = """name = "rear left"
@@ -99,12 +99,12 @@ def test_a_loop_is_the_block_on_any_mounts_of_its_box(kind: int | str, tmp_path:
             # loads of the loop are in coordinates in which the mass is one
             root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
             motion = np.linalg.solve(impedance - omega**2 * mounting.block.mass_matrix, np.linalg.solve(root, load))
-            felt = np.concatenate([k @ g @ motion for g, k in zip(mounting.motions, each, strict=True)])
-            felt += mounting.dynamic.forces(np.array([omega]), np.eye(6))[0] @ motion
+            forces = np.concatenate([k @ g @ motion for g, k in zip(mounting.motions, each, strict=True)])
+            forces += mounting.dynamic.forces(np.array([omega]), np.eye(6))[0] @ motion
             gone = np.concatenate([g @ motion for g in mounting.motions])
             turned = np.diag(share[loop.numbers])
             back = turned @ np.linalg.solve(np.eye(len(turned)) + loop.gain[w] @ turned, loop.inputs[w] @ load)
-            for maps, true in ((loop.forces, felt), (loop.travels, gone)):
+            for maps, true in ((loop.forces, forces), (loop.travels, gone)):
                 found = maps[0][w] @ load + maps[1][w] @ back
                 assert np.abs(found - true).max() <= 1e-9 * np.abs(true).max()
 

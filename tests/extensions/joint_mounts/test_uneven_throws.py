@@ -17,13 +17,13 @@ from laufruhe.solvers.result import Result
 PATH = Path(__file__).parents[2] / "claims" / "inputs" / "uneven-throws-beside-a-stiffness.toml"
 
 
-def told(norm: str = "rms") -> dict[str, Any]:
+def table_of_norm(norm: str = "rms") -> dict[str, Any]:
     return {**tomllib.loads(PATH.read_text(encoding="utf-8")), "objective": {"minimise": f"{norm} mount force"}}
 
 
 def own_at(throw: float, norm: str = "rms") -> OwnModel:
     """Return the model of the second throw at an angle [deg]."""
-    table = told(norm)
+    table = table_of_norm(norm)
     table["engine"]["throws"] = [0, throw]
     return OwnModel(table, 256)
 
@@ -65,7 +65,7 @@ def test_throws_beside_a_stiffness_and_a_balancer_are_proven() -> None:
 
 @pytest.mark.parametrize("norm", first_fast(["maximum", "mean", "peak to peak"], 0, 1))
 def test_means_and_peaks_have_a_bound_of_about_half_their_value(norm: str) -> None:
-    found = laufruhe.solve(told(norm))
+    found = laufruhe.solve(table_of_norm(norm))
     assert found.certificate is not None
     assert found.objective is not None
     assert found.certificate.lower_bound >= 0.45 * found.objective.value

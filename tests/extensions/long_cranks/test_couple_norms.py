@@ -38,7 +38,7 @@ CASES = [
 ]  # fmt: skip
 
 
-def asked(folder: Path, cylinders: int, cycle: str, name: str, gas: bool, phasing: str = "", rest: str = ""):
+def problem_of_norm(folder: Path, cylinders: int, cycle: str, name: str, gas: bool, phasing: str = "", rest: str = ""):
     text = MOUNTS + (GAS if gas else "") + rest + OBJECTIVES[name]
     problem = engines.problem(folder, cylinders, cycle, rest=text, phasing=phasing)
     (family,) = families_of(problem.phasing)[0]
@@ -63,7 +63,7 @@ def even_stars(family: Family) -> Stars:
 @pytest.mark.parametrize(("cylinders", "cycle", "name", "gas"), CASES)
 def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_path):
     """Values are no more than those of the cycle and near them; what is worth as little lies in the window."""
-    problem, family = asked(tmp_path, cylinders, cycle, name, gas)
+    problem, family = problem_of_norm(tmp_path, cylinders, cycle, name, gas)
     own, stars = norms_of(problem, family), even_stars(family)
     assert own is not None
     exact = np.array([
@@ -79,15 +79,15 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
         couples = np.abs(star_sums(stars, family.space.phases, family.space.places, window.orders)[:, :, 1])
         assert (couples <= window.reaches)[exact <= maximum].all()
         # those over a value may be told by less, never under it
-        told = own.values(family.space, stars, maximum)
-        assert told[low <= maximum] == pytest.approx(low[low <= maximum], rel=1e-12)
-        assert (told[low > maximum] > maximum).all()
-        assert (told <= low * (1.0 + 1e-9)).all()
+        bounded = own.values(family.space, stars, maximum)
+        assert bounded[low <= maximum] == pytest.approx(low[low <= maximum], rel=1e-12)
+        assert (bounded[low > maximum] > maximum).all()
+        assert (bounded <= low * (1.0 + 1e-9)).all()
 
 
 @pytest.mark.parametrize(("cylinders", "cycle", "gas"), [(7, "two-stroke", True), (9, "four-stroke", False)])
 def test_a_star_that_is_turned_is_worth_the_same(cylinders, cycle, gas, tmp_path):
-    problem, family = asked(tmp_path, cylinders, cycle, "rms", gas)
+    problem, family = problem_of_norm(tmp_path, cylinders, cycle, "rms", gas)
     own, r = norms_of(problem, family), np.random.default_rng(4)
     stars = np.array([[0, *r.permutation(family.first[1:])] for _ in range(20)], dtype=np.uint8)
     turned = ((stars.astype(int) + 3) % family.space.phases).astype(np.uint8)
@@ -97,7 +97,7 @@ def test_a_star_that_is_turned_is_worth_the_same(cylinders, cycle, gas, tmp_path
 @pytest.mark.slow
 @pytest.mark.parametrize(("cylinders", "name", "gas"), [(7, "mean", False), (8, "maximum", True), (7, "rms", True)])
 def test_halves_find_the_best_of_all_stars(cylinders, name, gas, tmp_path):
-    problem, family = asked(tmp_path, cylinders, "two-stroke", name, gas)
+    problem, family = problem_of_norm(tmp_path, cylinders, "two-stroke", name, gas)
     own = norms_of(problem, family)
     found, every = (how(family.space, own, 6) for how in (search_stars, enumerate_stars))
     assert found.complete
@@ -107,7 +107,7 @@ def test_halves_find_the_best_of_all_stars(cylinders, name, gas, tmp_path):
 @pytest.mark.slow
 def test_weights_on_single_throws_are_told_by_no_couple(tmp_path):
     weights = '[[counterweights]]\nname = "w"\nx = "200 mm"\nunbalance = "0.02 kg m"\nangle = 40\n'
-    problem, family = asked(tmp_path, 6, "two-stroke", "mean", False, rest=weights)
+    problem, family = problem_of_norm(tmp_path, 6, "two-stroke", "mean", False, rest=weights)
     assert norms_of(problem, family) is None
 
 
@@ -117,7 +117,7 @@ LENGTHS = [(11, "mean", False), (12, "maximum", True), (15, "mean", False)]
 @pytest.mark.parametrize(("cylinders", "name", "gas"), first_fast(LENGTHS, 0, 2))
 def test_long_cranks_are_proven(cylinders, name, gas, tmp_path):
     """No star drawn, and no exchange of the best one, is under what was proven."""
-    problem, family = asked(tmp_path, cylinders, "two-stroke", name, gas)
+    problem, family = problem_of_norm(tmp_path, cylinders, "two-stroke", name, gas)
     result = solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
     own, r = norms_of(problem, family), np.random.default_rng(cylinders)
@@ -139,14 +139,14 @@ def test_blocks_are_stars(phases):
 @pytest.mark.parametrize("throws", [35, 45])
 def test_blocks_leave_no_couple_of_many_throws(throws, tmp_path):
     """Each throw on a step of its own, and nothing is left of any order."""
-    problem, _ = asked(tmp_path, throws, "two-stroke", "mean", False)
+    problem, _ = problem_of_norm(tmp_path, throws, "two-stroke", "mean", False)
     result = solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value < 1e-3
 
 
 def test_starts_are_stars_of_the_space(tmp_path):
-    problem, family = asked(tmp_path, 9, "two-stroke", "rms", False)
+    problem, family = problem_of_norm(tmp_path, 9, "two-stroke", "rms", False)
     starts = good_starts(family.space, norms_of(problem, family))
     assert (np.sort(starts, axis=1) == np.arange(9)).all()
     assert (starts[:, 0] == 0).all()

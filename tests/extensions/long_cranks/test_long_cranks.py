@@ -27,8 +27,8 @@ MOUNTS = (
 
 def long(folder: Path, cylinders: int, cycle: str, norm: str, seconds: float = 30.0):
     phasing = f'time_limit = "{seconds} s"'
-    asked = MOUNTS + engines.MOUNT_FORCE.replace("mean", norm)
-    problem = engines.problem(folder, cylinders, cycle, phasing=phasing, rest=asked)
+    mounts = MOUNTS + engines.MOUNT_FORCE.replace("mean", norm)
+    problem = engines.problem(folder, cylinders, cycle, phasing=phasing, rest=mounts)
     (family,) = families_of(problem.phasing)[0]
     assert family.size > MAX_LISTED
     return problem, family

@@ -27,7 +27,7 @@ KINDS = {
 }
 
 
-def asked(folder: Path, mounts: str, norm: str = "rms") -> Problem:
+def damped_problem(folder: Path, mounts: str, norm: str = "rms") -> Problem:
     objective = f'[objective]\nminimise = "{norm} mount force"\norders = [2, 4]\n[fidelity]\nsamples = 144\n'
     return problem_of(folder, ENGINE, BLOCK, mounts, objective)
 
@@ -39,7 +39,7 @@ def asked(folder: Path, mounts: str, norm: str = "rms") -> Problem:
 def test_dampers_have_products_of_their_own_where_they_do_not_follow_stiffness(
     kind: str, springs: int, dampers: int, follow: int, tmp_path: Path
 ) -> None:
-    problem = asked(tmp_path, KINDS[kind])
+    problem = damped_problem(tmp_path, KINDS[kind])
     lower, upper = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     mounts = open_mounts(problem, lower, upper)
     assert sum(spring.elastic == 1.0 for spring in mounts.springs) == springs
@@ -54,7 +54,7 @@ CASES = [*((kind, "rms") for kind in KINDS), ("following", "maximum")]
 
 @pytest.mark.parametrize(("kind", "norm"), first_fast(CASES, 3))
 def test_no_design_is_under_the_bound_of_a_box(kind: str, norm: str, tmp_path: Path) -> None:
-    problem, generator = asked(tmp_path, KINDS[kind], norm), np.random.default_rng(5)
+    problem, generator = damped_problem(tmp_path, KINDS[kind], norm), np.random.default_rng(5)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     for share, tight in ((1.0, 0.0), (0.05, 0.9)):
         below = low + generator.random(len(low)) * (1.0 - share) * (high - low)

@@ -79,8 +79,8 @@ def test_an_answer_does_not_depend_on_those_before() -> None:
     program = Program(7)
     several = program.solver()
     for cost in (*program.costs, *program.costs[::-1]):
-        for told, alone in zip(several.solve(cost), program.solver().solve(cost), strict=True):
-            assert np.array_equal(told, alone)
+        for solved, alone in zip(several.solve(cost), program.solver().solve(cost), strict=True):
+            assert np.array_equal(solved, alone)
 
 
 def test_a_root_is_proven_above_all_its_lengths() -> None:

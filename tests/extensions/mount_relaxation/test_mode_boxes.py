@@ -100,16 +100,16 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
     inside = [x for x, value in designs if value <= 1.1 * minimum]
     for number in (0, 2):
         cost = stated.cost(np.eye(program.numbers + 10)[number])
-        told = stated.solve(cost)
+        answer = stated.solve(cost)
         side = mounts.single_decisions[number]
         assert side is not None
         smallest = min((x[side] - 0.5 * (boxes.lower + boxes.upper)[side]) / half[side] for x in inside)
-        assert -1.01 <= told.bound <= smallest
+        assert -1.01 <= answer.bound <= smallest
         # by the solver of the aim before, as exactly as it is worth
         proven, spring_mounts = stated.minimum(np.eye(program.numbers + 10)[number])
-        assert told.bound - 0.05 < proven <= min(smallest, spring_mounts[number] + 0.05)
+        assert answer.bound - 0.05 < proven <= min(smallest, spring_mounts[number] + 0.05)
         for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
-            assert stated.bound(cost, spoilt(stated, told.z, by, noise, generator)) <= smallest
+            assert stated.bound(cost, spoilt(stated, answer.z, by, noise, generator)) <= smallest
 
 
 def of_mode(mode: ModeConstraints, count: int) -> SdpProgram:
@@ -129,9 +129,9 @@ def test_the_bound_of_a_mode_is_under_its_lagrangian(size: float) -> None:
             r.normal(size=(2, 1 + count, d, d)),
         )  # fmt: skip
         cones = ConeProgram(of_mode(mode, count))
-        told, slope = size * r.normal(size=sum(map(len, cones.right))), r.normal(size=count + d - 1)
+        multipliers, slope = size * r.normal(size=sum(map(len, cones.right))), r.normal(size=count + d - 1)
         cost = cones.cost(slope)
-        bound, z = cones.bound(cost, told), in_dual_cones(told, cones.cones)
+        bound, z = cones.bound(cost, multipliers), in_dual_cones(multipliers, cones.cones)
         values = []
         for w, s in zip(r.normal(size=(200, d - 1)), r.uniform(-1.0, 1.0, (200, count)), strict=True):
             shape = np.append(1.0, w / np.linalg.norm(w))
@@ -176,8 +176,8 @@ def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
     pulled = []
     for own, crossed in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
         rng_of = np.random.default_rng(seed + 10)
-        (told,) = cones.mode_scores(Solution(0.0, s, (), (moments(own, crossed),), prices))
-        pulled.append(told)
+        (score,) = cones.mode_scores(Solution(0.0, s, (), (moments(own, crossed),), prices))
+        pulled.append(score)
     none, plain, mixed, both = pulled
     for k in range(2):
         assert np.all(none[k] < 1e-9)

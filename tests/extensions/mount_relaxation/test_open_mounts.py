@@ -91,10 +91,10 @@ def test_a_total_stiffness_outside_is_told_as_a_share_of_its_limit(tmp_path: Pat
     for x in designs(problem, 20):
         mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
         total = sum(float(np.trace(k)) for k in mounting.springs)
-        told = [float(each.min()) for each in rest.over(x, x)]
+        violations = [float(each.min()) for each in rest.over(x, x)]
         by = [total / 2.5e6 - 1.0, 1.0 - total / 1.1e6]
-        assert min(abs(own - by[0]) for own in told) < 1e-5
-        assert min(abs(own - by[1]) for own in told) < 1e-5
+        assert min(abs(own - by[0]) for own in violations) < 1e-5
+        assert min(abs(own - by[1]) for own in violations) < 1e-5
         seen.add(max(by) > 0.0)
     assert seen == {True, False}
 

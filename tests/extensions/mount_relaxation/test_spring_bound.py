@@ -50,7 +50,7 @@ TURNED = changed(
 )
 ANY = ResponseBound((), np.inf, False)
 NARROW = '\norders = [2, 4]\noperating_points = ["idle"]'
-ASKED = {
+OBJECTIVES = {
     "rms": 'minimise = "rms mount force"\norders = [2, 4]',
     "narrowed": 'minimise = "rms mount force"\nmounts = ["front left"]\ndirection_weights = [1, 0.5, 2]' + NARROW,
     "travel": 'minimise = "rms mount travel"' + NARROW,
@@ -88,7 +88,7 @@ def asked_of(problem: Problem) -> SdpRelaxation:
 
 
 def test_open_springs_add_up_to_what_the_matrices_change_by(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, ASKED["rms"], mounts=TURNED)
+    problem = asked_for(tmp_path, OBJECTIVES["rms"], mounts=TURNED)
     boxes, model = asked_of(problem), StiffnessBoxes(problem, 1.0).model
     mounts = open_mounts(problem, model.lower, model.upper)
     half = 0.5 * (boxes.upper - boxes.lower)
@@ -133,8 +133,8 @@ def truth(
     for place in mounts.places:
         s = numbers[place.number]
         products += [s * place.turn_axes @ mounts.turns @ motion]
-        for felt in (elastic, viscous)[: 1 + place.is_damped]:
-            times = [(mounts.symmetry_factors[k] * h, felt[mounts.members[k][0]]) for k, h in place.mounts]
+        for forces_of_kind in (elastic, viscous)[: 1 + place.is_damped]:
+            times = [(mounts.symmetry_factors[k] * h, forces_of_kind[mounts.members[k][0]]) for k, h in place.mounts]
             products += [s * sum(h * place.arms @ force for h, force in times)]
     rows = np.concatenate([added for _, added in line.springs] + [moved for _, moved in line.places])
     first, count = 1 + line.columns, len(rows)
@@ -230,12 +230,12 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
     """E42, E43, E52, E53, E57: motion, forces and travel by solving anew, and no condition broken, with turned and
     moved mounts and unbalances open too; of all motions, and of both halves where mounts mirror each other."""
     monkeypatch.setattr(orders_, "OMITTED_SYMMETRY", -1.0)
-    plain = asked_for(tmp_path, ASKED["narrowed"], mounts=TURNED) if name == "stiffness" else None
+    plain = asked_for(tmp_path, OBJECTIVES["narrowed"], mounts=TURNED) if name == "stiffness" else None
     (tmp_path / "four.toml").write_text(tractor(name), encoding="utf-8")
     problem = plain or load(tmp_path / "four.toml")
     boxes, generator = asked_of(problem), np.random.default_rng(4)
     about = np.array([d.real_start for d in problem.mount_decisions])
-    kept, halves = 0, set[int]()
+    count, halves = 0, set[int]()
     for low, high, x, u in designs_in(generator, boxes, about, 40):
         parts, orders = boxes.parts(low, high), boxes._terms[0][1].orders
         order, k = orders[int(generator.integers(len(orders)))], int(generator.integers(len(parts)))
@@ -244,25 +244,25 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
         # of the load of all motions what half of them has
         order = replace(order, loads=order.loads @ np.linalg.solve(parts[0].root.T, mounts.root.T))
         line = boxes.response(mounts, order, ANY, low, high)
-        told = truth(problem, parts[0], mounts, order, line, x, u)
+        exact = truth(problem, parts[0], mounts, order, line, x, u)
         for function, value in (
-            (line.motion, told.motion), (line.forces, told.forces), (line.deflections, told.travel),
-            (line.carried, told.stiffness @ told.motion),
+            (line.motion, exact.motion), (line.forces, exact.forces), (line.deflections, exact.travel),
+            (line.carried, exact.stiffness @ exact.motion),
         ):  # fmt: skip
-            assert np.allclose(function @ told.vector * line.unit, value, rtol=1e-7, atol=1e-8 * np.abs(value).max())
-        assert np.sum(told.vector[1:] ** 2) <= line.reach * (1.0 + 1e-9)
-        assert np.abs(told.numbers).max() <= 1.0 + 1e-9
-        values = np.linalg.eigvalsh(told.stiffness)
-        if not _is_allowed(mounts, told.stiffness):
+            assert np.allclose(function @ exact.vector * line.unit, value, rtol=1e-7, atol=1e-8 * np.abs(value).max())
+        assert np.sum(exact.vector[1:] ** 2) <= line.reach * (1.0 + 1e-9)
+        assert np.abs(exact.numbers).max() <= 1.0 + 1e-9
+        values = np.linalg.eigvalsh(exact.stiffness)
+        if not _is_allowed(mounts, exact.stiffness):
             continue
-        kept += 1
+        count += 1
         assert mounts.lowest <= values[0] * (1.0 + 1e-9)
         assert values[-1] <= mounts.highest * (1.0 + 1e-9)
         for limit in moment_constraints(mounts, line):
-            moments = np.einsum("abij,i,j->ab", limit.moments, told.vector, told.vector)
-            whole = limit.constant + np.tensordot(told.numbers, limit.slopes, 1) + moments
+            moments = np.einsum("abij,i,j->ab", limit.moments, exact.vector, exact.vector)
+            whole = limit.constant + np.tensordot(exact.numbers, limit.slopes, 1) + moments
             assert np.linalg.eigvalsh(whole)[0] >= -1e-9 * max(1.0, np.abs(whole).max())
-    assert kept > 10
+    assert count > 10
     # of a matrix in space mirrored mounts share no numbers
     assert halves == ({0} if "space" in name else {0, 1, 2})
 
@@ -271,16 +271,16 @@ OWN = 'damping = ["900 N s/m", "900 N s/m", "500 N s/m"]\n'
 
 
 @pytest.mark.parametrize(
-    ("told", "follows"),
+    ("springs", "follows"),
     [(OWN, True), (OWN.replace('"500 N s/m"', '{ between = ["300 N s/m", "500 N s/m"] }'), False)],
     ids=["given", "open"],
 )
 def test_dampers_of_mounts_that_turn_or_move_are_followed_where_they_are_given(
-    told: str, follows: bool, tmp_path: Path
+    springs: str, follows: bool, tmp_path: Path
 ) -> None:
     """E66."""
     text = POWERTRAIN.with_name("tractor-four-elastic.toml").read_text(encoding="utf-8")
-    own = ("turned    = [", f"{told}turned    = ["), ('name = "rear left"', f'name = "rear left"\n{OWN}')
+    own = ("turned    = [", f"{springs}turned    = ["), ('name = "rear left"', f'name = "rear left"\n{OWN}')
     (tmp_path / "four.toml").write_text(changed(text, *own), encoding="utf-8")
     assert is_lifted(load(tmp_path / "four.toml")) is follows
 
@@ -309,14 +309,16 @@ def test_halves_in_the_mirror_add_up_and_no_norm_of_one_is_over_that_of_both() -
     generator = np.random.default_rng(2)
     members = ((0, 2), (1,), (3, 4))
     for _ in range(20):
-        felt = generator.normal(size=(5, 3)) + 1j * generator.normal(size=(5, 3))
-        halves = split_signal(felt, members)
-        assert np.allclose(halves[0] + halves[1], felt)
+        signal = generator.normal(size=(5, 3)) + 1j * generator.normal(size=(5, 3))
+        halves = split_signal(signal, members)
+        assert np.allclose(halves[0] + halves[1], signal)
         angles = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 90))
         for norm in (np.sum, np.max):
-            worth = [norm(np.linalg.norm((each[..., None] * angles).real, axis=1), axis=0) for each in (felt, *halves)]
+            worth = [
+                norm(np.linalg.norm((each[..., None] * angles).real, axis=1), axis=0) for each in (signal, *halves)
+            ]
             assert max(each.mean() for each in worth[1:]) <= worth[0].mean() * (1.0 + 1e-12)
-        squares = [np.sum(np.abs(each) ** 2) for each in (felt, *halves)]
+        squares = [np.sum(np.abs(each) ** 2) for each in (signal, *halves)]
         assert squares[0] == pytest.approx(squares[1] + squares[2])
 
 
@@ -328,9 +330,9 @@ def _is_allowed(mounts: OpenMounts, stiffness: np.ndarray) -> bool:
 
 
 @pytest.mark.parametrize("limits", ["", LIMITS], ids=["free", "limited"])
-@pytest.mark.parametrize("name", first_fast(ASKED, 1))
+@pytest.mark.parametrize("name", first_fast(OBJECTIVES, 1))
 def test_no_design_in_a_box_is_under_its_bound(name: str, limits: str, tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, ASKED[name], limits, mounts=TURNED)
+    problem = asked_for(tmp_path, OBJECTIVES[name], limits, mounts=TURNED)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     centre, tight = next(designs_of(problem, low, high, 100, 5))[0], 0.0
     for share in (1.0, 0.02):
@@ -372,8 +374,8 @@ NORMS = {"mean": 0, "rms": 0, "maximum": 0, "peak to peak": 0, "worst mean": 0}
 @pytest.mark.parametrize("norm", first_fast(NORMS, 1))
 def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_path: Path) -> None:
     """A sector, an angle given and an inclination open beside two stiffnesses, and a place; every norm."""
-    asked = f'[objective]\nminimise = "{norm} mount force"\norders = [1, 2, 4]\n[fidelity]\nsamples = 144\n'
-    problem = problem_of(tmp_path, ENGINE, BLOCK, MOVED, BALANCED, asked + LIMITS)
+    objective = f'[objective]\nminimise = "{norm} mount force"\norders = [1, 2, 4]\n[fidelity]\nsamples = 144\n'
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOVED, BALANCED, objective + LIMITS)
     generator, given = np.random.default_rng(8), []
     domains = [d.set for d in problem.unbalances]
     for share in generator.random((120, len(problem.decisions))):
@@ -405,7 +407,7 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
 @pytest.mark.parametrize("name", ["rms", pytest.param("means", marks=pytest.mark.slow)])
 def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Multipliers at random, and none at all."""
-    problem = asked_for(tmp_path, ASKED.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED)
+    problem = asked_for(tmp_path, OBJECTIVES.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     high = low + 0.2 * (high - low)
     best, minimum = min(designs_of(problem, low, high, 200, 1), key=lambda pair: pair[1])
@@ -439,17 +441,17 @@ def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
         )
         for _ in range(30):
             size = 10.0 ** generator.uniform(-2.0, 0.0)
-            felt = {
+            forces = {
                 k: (1.0 if k == 1 else size) * (generator.normal(size=3) + 1j * generator.normal(size=3))
                 for k in (1, 2, 3, 4, 5)
             }
-            signal = sum(np.real(f[:, None] * np.exp(1j * k * place * angles)) for k, f in felt.items())
+            signal = sum(np.real(f[:, None] * np.exp(1j * k * place * angles)) for k, f in forces.items())
             mean = float(np.linalg.norm(signal, axis=0).mean())
-            shown = factor * np.linalg.norm(felt[1])
-            shown -= sum(w * np.linalg.norm(felt[k]) for w, k in zip(head.multiple_weights, (3, 5), strict=True))
+            shown = factor * np.linalg.norm(forces[1])
+            shown -= sum(w * np.linalg.norm(forces[k]) for w, k in zip(head.multiple_weights, (3, 5), strict=True))
             assert shown <= mean * (1.0 + 1e-12)
             if size < 0.02:
-                assert mean < 1.3 * factor * np.linalg.norm(felt[1])
+                assert mean < 1.3 * factor * np.linalg.norm(forces[1])
 
 
 def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
@@ -473,13 +475,13 @@ def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
             motion = np.linalg.solve(k + 1j * h - omega**2 * np.eye(mounts.size), load_)
             travel = mounting.motions @ mounts.root.T @ motion
             forces = np.einsum("mij,mj->mi", mounting.springs + 1j * mounting.losses, travel)
-            felt = float(np.linalg.norm(forces, axis=1).sum())
-            assert felt <= line.constant + float(line.slopes @ numbers)
+            force = float(np.linalg.norm(forces, axis=1).sum())
+            assert force <= line.constant + float(line.slopes @ numbers)
             # chords are over what they cover by what is told of them, and by nothing at their ends
             over = high.looseness(numbers)
             assert np.all(over >= 0.0)
             assert over.sum() <= sum(chord.bound(numbers).at_reference for chord in high.chords)
-            tight = max(tight, felt / line.largest)
+            tight = max(tight, force / line.largest)
     assert tight > 0.3
 
 
@@ -552,8 +554,8 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective is not None
     few, value = replace(problem, search=replace(problem.search, boxes=4)), result.objective.value
-    asked = spring_bound(Question(few, 1.1 * value, 1e-3 * value, [decision.value for decision in result.decisions]))
-    assert 0.999 * value < asked.bound <= min(value, minimum) * (1.0 + 1e-9)
+    answer = spring_bound(Question(few, 1.1 * value, 1e-3 * value, [decision.value for decision in result.decisions]))
+    assert 0.999 * value < answer.bound <= min(value, minimum) * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
@@ -575,7 +577,7 @@ PLACES = changed(MOUNTS, ('["300 mm", "200 mm", "0 mm"]', '[{ between = ["270 mm
 
 @pytest.mark.parametrize("mounts", [MOUNTS, PLACES], ids=["stiffness", "places too"])
 def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_allow(tmp_path: Path, mounts: str) -> None:
-    problem, generator = asked_for(tmp_path, ASKED["rms"], mounts=mounts), np.random.default_rng(5)
+    problem, generator = asked_for(tmp_path, OBJECTIVES["rms"], mounts=mounts), np.random.default_rng(5)
     model = StiffnessBoxes(problem, 1.0).model if mounts is MOUNTS else None
     lower, upper = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     whole = open_mounts(problem, lower, upper)
@@ -586,10 +588,10 @@ def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_all
         mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
         if model is not None:
             near = numbers_of(whole, mounting)
-            told = linear_sum(whole, weights, near)
+            line = linear_sum(whole, weights, near)
             true = float(np.sum(weights * mounting.springs))
-            assert told.constant + told.slopes @ near == pytest.approx(true, rel=1e-9)
-            assert told.at_reference == pytest.approx(true, rel=1e-9)
+            assert line.constant + line.slopes @ near == pytest.approx(true, rel=1e-9)
+            assert line.at_reference == pytest.approx(true, rel=1e-9)
         load = generator.normal(size=(6, 2)) @ [1.0, 1.0j]
         for m, (motion, spring) in enumerate(zip(mounting.motions, mounting.springs, strict=True)):
             travel = motion @ whole.root.T @ load
@@ -607,8 +609,8 @@ def test_a_place_behind_the_middle_is_narrowed_at_both_ends(tmp_path: Path) -> N
     fixed = MOUNTS.replace(OPEN_STIFFNESS, '"400 N/mm"').replace(
         '["-300 mm"', '[{ between = ["-400 mm", "-50 mm"], start = "-300 mm" }'
     )
-    asked = '[objective]\nminimise = "rms mount force"\norders = [2]\n'
-    problem = problem_of(tmp_path, ENGINE.replace("700 rpm", "500 rpm"), BLOCK, fixed, asked)
+    objective = '[objective]\nminimise = "rms mount force"\norders = [2]\n'
+    problem = problem_of(tmp_path, ENGINE.replace("700 rpm", "500 rpm"), BLOCK, fixed, objective)
     evaluation, (place,) = evaluate(problem), problem.mount_decisions
     designs = np.linspace(place.lower, place.upper, 41)
     values = [objective_value(problem, with_mounts(evaluation, problem.design([x]))) for x in designs.tolist()]
@@ -637,17 +639,17 @@ def test_no_design_on_hydraulic_mounts_moves_more_than_is_told() -> None:
         full = stiffness + extra + 1j * (loss + omega * damping) - omega**2 * np.eye(6)
         for load_ in (np.linalg.eigh(stiffness + extra.real)[1][:, -1], *generator.normal(size=(5, 6))):
             travel = mounting.motions @ mounts.root.T @ np.linalg.solve(full, load_)
-            told = response_bound(mounts, load_[None].astype(np.complex128), omega, True, chosen)
-            felt = float(np.linalg.norm(travel, axis=1).sum())
-            assert felt <= told * (1.0 + 1e-9)
-            tight = max(tight, felt / told)
+            maximum = response_bound(mounts, load_[None].astype(np.complex128), omega, True, chosen)
+            response = float(np.linalg.norm(travel, axis=1).sum())
+            assert response <= maximum * (1.0 + 1e-9)
+            tight = max(tight, response / maximum)
     assert tight > 0.3
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
 def test_what_is_a_share_of_a_norm_may_be_so_much_larger(share: float, tmp_path: Path) -> None:
     """Where a norm is at most one number, a root that is half of it is at most twice that, its square four times."""
-    boxes = asked_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + ASKED["rms"]))
+    boxes = asked_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + OBJECTIVES["rms"]))
     ((variable,), *_), look = boxes._variables, boxes._box(0, boxes.lower, boxes.upper)
     whole, part = (
         look.cut_off([replace(variable, share=own, loss=0.0)], boxes._roots[0]).uppers[0] for own in (1.0, share)

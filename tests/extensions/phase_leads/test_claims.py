@@ -32,13 +32,13 @@ def test_a_broken_bounder_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 def test_a_broken_bounder_of_leads_between_shared_chambers(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = dict(tables_of(PROBLEMS / "opposed-pistons-lead.toml"))
-    told.pop("counterweights", None)
-    told["engine"] = {**told["engine"], "crank_lead": {"between": [4, 16]}}
-    told |= {"objective": {"minimise": "rms roll moment"}, "tolerance": 1e-2, "fidelity": {"samples": 180}}
+    tables = dict(tables_of(PROBLEMS / "opposed-pistons-lead.toml"))
+    tables.pop("counterweights", None)
+    tables["engine"] = {**tables["engine"], "crank_lead": {"between": [4, 16]}}
+    tables |= {"objective": {"minimise": "rms roll moment"}, "tolerance": 1e-2, "fidelity": {"samples": 180}}
     scaled(SharedGasBoxes, "_bound", times(1.01))(monkeypatch)
     with pytest.raises(BoundError):
-        laufruhe.solve(load_tables(told, Path("shared.toml")))
+        laufruhe.solve(load_tables(tables, Path("shared.toml")))
 
 
 @pytest.mark.slow

@@ -136,16 +136,16 @@ def turned(text: str, angle: float) -> str:
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "objective",
     [
         '"degree of irregularity"', '"peak to peak stored work"', '"rms roll moment"\norders = [1, 2, 3]',
         pytest.param('"maximum crank torque"', marks=pytest.mark.slow),
         pytest.param('"mean mount force"', marks=pytest.mark.slow),
     ],
 )  # fmt: skip
-def test_the_angle_between_machines_is_the_least_of_a_scan(asked: str, tmp_path: Path) -> None:
+def test_the_angle_between_machines_is_the_least_of_a_scan(objective: str, tmp_path: Path) -> None:
     """Against the same machines with throws on one crankshaft, whose loads no lead moves."""
-    text = changed(BARE, '"rms mount force"', asked)
+    text = changed(BARE, '"rms mount force"', objective)
     result = solve(loaded(tmp_path, text))
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL

@@ -26,15 +26,15 @@ READY = tables_of(PROBLEMS / "opposed-pistons-lead.toml")
 
 
 def problem(quantity: str, lead: Any, **more: Any) -> Problem:
-    told = {key: value for key, value in READY.items() if key != "counterweights"}
-    told["engine"] = {**told["engine"], "crank_lead": lead, **more.pop("engine", {})}
-    told |= {
+    tables = {key: value for key, value in READY.items() if key != "counterweights"}
+    tables["engine"] = {**tables["engine"], "crank_lead": lead, **more.pop("engine", {})}
+    tables |= {
         "objective": {"minimise": quantity},
         "tolerance": 1e-2,
         "fidelity": {"samples": 180, "gas_samples": 720},
         **more,
     }
-    return load_tables({key: value for key, value in told.items() if value is not None}, Path("shared.toml"))
+    return load_tables({key: value for key, value in tables.items() if value is not None}, Path("shared.toml"))
 
 
 def between(low: float, high: float, **more: float) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def test_torque_changes_by_no_more_than_is_told(seed: int) -> None:
     random = np.random.default_rng(seed)
     cycle = (Cycle.TWO_STROKE, Cycle.FOUR_STROKE)[seed % 2]
     ratio, rods, radii = float(random.choice([-1.0, 1.0])), random.uniform(0.1, 0.35, 2), random.uniform(0.03, 0.08, 2)
-    told, ahead = (tuple(rods), tuple(radii), cycle), 0.0 if seed == 5 else random.uniform(-1.2, 1.2)
+    geometry, ahead = (tuple(rods), tuple(radii), cycle), 0.0 if seed == 5 else random.uniform(-1.2, 1.2)
     # more than what expands to its end has left
     behind = {"exhaust_pressure": 12e5} if seed > 5 else {}
     gas = Seiliger(peak_pressure=90e5, imep=14e5, compression_ratio=float(random.uniform(12.0, 18.0)), **behind)
@@ -66,11 +66,11 @@ def test_torque_changes_by_no_more_than_is_told(seed: int) -> None:
     angles = np.sort(np.concatenate([cycle.angle * (np.arange(count) + s) / count for s in (0.01, 0.5, 0.99)]))
 
     def torque(lead: float) -> np.ndarray:
-        parts = pair(lead, ratio, *told)
+        parts = pair(lead, ratio, *geometry)
         return sum(chamber_torque(gas, part, cycle, angles - part.firing_angle) for part in parts)
 
     for half in (1e-4, 3e-3, 0.05):
-        maximum = np.repeat(torque_change(gas, pair(ahead, ratio, *told)[0], cycle, half), 3)
+        maximum = np.repeat(torque_change(gas, pair(ahead, ratio, *geometry)[0], cycle, half), 3)
         here, found = torque(ahead), np.zeros(len(angles))
         for by in (-1.0, -0.6, 0.3, 1.0):
             found = np.maximum(found, np.abs(torque(ahead + by * half) - here))
@@ -106,8 +106,8 @@ def test_a_torque_at_either_point_changes_a_norm_by_no_more_than_is_told(norm: s
             "maximum": sizes.max(),
             "peak to peak": np.ptp(torques, axis=1).max(),
         }[norm]
-        told = boxes._gas_change(measure, changes)
-        assert true * (1.0 - 1e-12) <= told <= 3.0 * true
+        bound = boxes._gas_change(measure, changes)
+        assert true * (1.0 - 1e-12) <= bound <= 3.0 * true
 
 
 @pytest.mark.slow
@@ -171,9 +171,9 @@ def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
 @pytest.mark.slow
 def test_gas_that_is_not_felt_hinders_no_lead() -> None:
     """Its forces close inside: the shaking force is decided beside weights, as without gas."""
-    told = {key: READY[key] for key in ("counterweights",)}
+    tables = {key: READY[key] for key in ("counterweights",)}
     with_gas, without = (
-        laufruhe.solve(problem("rms shaking force", between(3, 40), **told, **more)) for more in ({}, {"gas": None})
+        laufruhe.solve(problem("rms shaking force", between(3, 40), **tables, **more)) for more in ({}, {"gas": None})
     )
     assert with_gas.objective.value == pytest.approx(without.objective.value, rel=1e-4)
     assert str(with_gas.certificate.kind) == "global"

@@ -164,10 +164,10 @@ def test_another_program_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_a_full_disk_is_one_line_and_the_study_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    keys, keep, kept = DESIGNS + "draws = 60\nchunk = 10", Draws.keep, iter(range(99))
+    keys, keep, calls = DESIGNS + "draws = 60\nchunk = 10", Draws.keep, iter(range(99))
 
     def full(self: Draws, *words: Any) -> None:
-        if next(kept) >= 3:
+        if next(calls) >= 3:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         keep(self, *words)
 

@@ -12,7 +12,7 @@ import pytest
 import laufruhe
 from attack.families import toml
 from extensions.receivers import tractor_seat
-from extensions.receivers.felt import Felt, draw, functions
+from extensions.receivers.plain_receivers import PlainReceivers, draw, functions
 from lanes import first_fast
 from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.receivers.section import SECTION
@@ -35,9 +35,9 @@ def written(table: dict[str, Any], folder: Path) -> Path:
 
 def measured(path: Path, design: Any) -> float:
     """Value of the objective of a file for a design, by the own evaluation."""
-    felt = Felt(path)
-    norm, _, quantity = felt.table["objective"]["minimise"].partition(" receiver ")
-    return felt.value(design, felt.table["objective"], norm, UNITS[quantity])
+    model = PlainReceivers(path)
+    norm, _, quantity = model.table["objective"]["minimise"].partition(" receiver ")
+    return model.value(design, model.table["objective"], norm, UNITS[quantity])
 
 
 def random_designs(problem: Problem, count: int) -> list[Any]:

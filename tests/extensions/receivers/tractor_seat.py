@@ -16,7 +16,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from extensions.receivers import two_bodies as own
-from extensions.receivers.felt import AXES, Felt
+from extensions.receivers.plain_receivers import AXES, PlainReceivers
 from laufruhe.units import parse
 
 PROBLEMS = Path(__file__).parents[3] / "problems"
@@ -36,7 +36,7 @@ def seat(f: float) -> float | complex:
 def functions() -> tuple[list[str], np.ndarray]:
     """Return the names of the mounts, and acceleration per force, shape (frequencies, 3, 3 mounts) [m/s^2/N]."""
     table = tomllib.loads((PROBLEMS / "tractor-seat.toml").read_text(encoding="utf-8"))
-    frame, places = Felt.frame_of(table["frame"]), table["mounts"]["places"]
+    frame, places = PlainReceivers.frame_of(table["frame"]), table["mounts"]["places"]
     centre = np.array(frame.body.centre_of_gravity)
     feet = np.vstack([own.arm(np.array([parse(x, "m") for x in place["position"]]), centre) for place in places])
     answers = []

@@ -63,8 +63,8 @@ def finished() -> Callable[..., None]:
         for part in names or parts_of(file):
             points = shared_part(file, part) / FINISHED_POINTS
             if points.exists():
-                with (folder / FINISHED_POINTS).open("ab") as kept:
-                    kept.write(points.read_bytes())
+                with (folder / FINISHED_POINTS).open("ab") as target:
+                    target.write(points.read_bytes())
 
     return fill
 

@@ -21,9 +21,9 @@ FEW = ("fig-08-09", "fig-25", "fig-32")
 def study_with(names: Collection[str], folder: Path) -> Path:
     """Write the study with these parts alone, or with all of them."""
     head, *parts = (PROBLEMS / "tractor-study.toml").read_text(encoding="utf-8").split("[[study.parts]]\n")
-    kept = [part for part in parts if not names or part.split('"')[1] in names]
-    assert len(kept) == (len(names) or len(parts))
-    (folder / "tractor-study.toml").write_text("[[study.parts]]\n".join([head, *kept]), encoding="utf-8")
+    chosen = [part for part in parts if not names or part.split('"')[1] in names]
+    assert len(chosen) == (len(names) or len(parts))
+    (folder / "tractor-study.toml").write_text("[[study.parts]]\n".join([head, *chosen]), encoding="utf-8")
     return folder / "tractor-study.toml"
 
 

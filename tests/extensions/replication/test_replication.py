@@ -93,8 +93,8 @@ class TestExpressions:
         assert time.process_time() - started < 10.0
 
     def test_texts_are_filled(self) -> None:
-        told = {"a": ["{x} kg", "{throws}", 3], "b": "{x:.2f} and {2 * x:.0f} %", "c": "plain"}
-        assert fill_in(told, NAMES) == {"a": ["2.0 kg", [0, 180, 180, 0], 3], "b": "2.00 and 4 %", "c": "plain"}
+        template = {"a": ["{x} kg", "{throws}", 3], "b": "{x:.2f} and {2 * x:.0f} %", "c": "plain"}
+        assert fill_in(template, NAMES) == {"a": ["2.0 kg", [0, 180, 180, 0], 3], "b": "2.00 and 4 %", "c": "plain"}
         for wrong in ("{x", "{x:1000000000f}", "{x:d}", "{z}"):
             with pytest.raises(ExpressionError):
                 fill_in(wrong, NAMES)
@@ -149,8 +149,8 @@ def test_readings_stand_side_by_side() -> None:
     assert isinstance(shown, Table)
     assert list(shown.head) == ["statement", "source", "as printed", "confirmed", "as meant", "confirmed", "reason"]
     assert shown.rows == [["s", "3", "2", "**no**", "3", "yes", "as printed: 2 found<br>as meant: 3 found"]]
-    told = "as printed: 1 of 2 statements are confirmed. as meant: 2 of 2 statements are confirmed."
-    assert count_confirmed([in_one, in_two]) == told
+    expected = "as printed: 1 of 2 statements are confirmed. as meant: 2 of 2 statements are confirmed."
+    assert count_confirmed([in_one, in_two]) == expected
 
 
 def _part(**more: Any) -> Replication:

@@ -54,8 +54,8 @@ def places(part: RhombicHalf) -> list[moving.Mass]:
 def test_loads_of_one_crank_are_those_of_its_masses(k: int) -> None:
     part = halves(0.9, 0.7)[k]
     loads = shaking_loads(Engine("one", Cycle.TWO_STROKE, (part,)), AT).sample(moving.STEPS)
-    wanted = moving.wrench(places(part), SPEED)
-    assert pytest.approx(wanted, abs=1e-8 * np.abs(wanted).max()) == loads[:, [1, 2, 3]].T
+    expected = moving.wrench(places(part), SPEED)
+    assert pytest.approx(expected, abs=1e-8 * np.abs(expected).max()) == loads[:, [1, 2, 3]].T
 
 
 def test_rods_turn_against_each_other() -> None:

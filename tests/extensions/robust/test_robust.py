@@ -154,13 +154,13 @@ def test_prices_are_slopes(problem: Problem, result: Result) -> None:
     """Against other optima: every tolerance a little wider and a little narrower."""
     assert isinstance(result.details, RobustResult)
     fine = replace(problem, tolerance=3e-6)
-    for told in result.details.tolerances[1:2]:
+    for tolerance in result.details.tolerances[1:2]:
         wide, narrow = (
-            worst(solve(with_tolerances(fine, tolerances_of(problem).scaled(told.name, 1.0 + step))))
+            worst(solve(with_tolerances(fine, tolerances_of(problem).scaled(tolerance.name, 1.0 + step))))
             for step in (0.02, -0.02)
         )
-        assert told.saving == pytest.approx((wide - narrow) / 0.04, rel=5e-3)
-        assert told.price * told.size == pytest.approx(told.saving)
+        assert tolerance.saving == pytest.approx((wide - narrow) / 0.04, rel=5e-3)
+        assert tolerance.price * tolerance.size == pytest.approx(tolerance.saving)
 
 
 def test_share_of_engines(problem: Problem, result: Result) -> None:
@@ -169,11 +169,11 @@ def test_share_of_engines(problem: Problem, result: Result) -> None:
     assert isinstance(shared.details, RobustResult)
     assert shared.certificate.kind in (Proof.LOCAL, Proof.GLOBAL)
     assert shared.certificate.lower_bound <= worst(shared) < worst(result)
-    told = shared.details
+    details = shared.details
     # another sample agrees with the one that decided
-    assert told.robust.low <= told.robust.share <= told.robust.high
-    assert told.robust.share == pytest.approx(worst(shared), rel=0.02)
-    assert told.exceeding_at_most < 0.08
+    assert details.robust.low <= details.robust.share <= details.robust.high
+    assert details.robust.share == pytest.approx(worst(shared), rel=0.02)
+    assert details.exceeding_at_most < 0.08
     # and no neighbour is better in the sample that decided
     errors = tolerances_of(problem).draw_mirrored(np.random.default_rng(3), 400)
     values = [d.value for d in shared.decisions]
@@ -233,9 +233,9 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
         solved[0], adversary.at(solved[0], proven=True), 0.0, program.active, 1, angles, adversary.samples
     )
     assert FEASIBILITY_TOL < first.worst.violation < MAX_MARGIN
-    kept = _keep_limits(program, adversary, first)
-    assert kept.worst.violation <= FEASIBILITY_TOL
-    assert kept.worst.value > first.worst.value
+    tightened = _keep_limits(program, adversary, first)
+    assert tightened.worst.violation <= FEASIBILITY_TOL
+    assert tightened.worst.value > first.worst.value
 
 
 def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None:
@@ -312,15 +312,15 @@ loss_factor = 0.1
 """
 
 
-def asked(quantity: str, samples: int = 48) -> str:
+def minimise(quantity: str, samples: int = 48) -> str:
     return f'[objective]\nminimise = "{quantity}"\n[fidelity]\nsamples = {samples}\n'
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        VEE + WEIGHT + asked("rms shaking force"),
-        VEE + WEIGHT + asked("maximum shaking force"),
+        VEE + WEIGHT + minimise("rms shaking force"),
+        VEE + WEIGHT + minimise("maximum shaking force"),
         TEXT.replace(MOUNTS, ELASTIC + MOUNTS.replace("[mounts]", "")),
         TEXT.replace('[[operating_points]]\nspeed = "2500 rpm"\n', TWO_POINTS),
         TEXT.replace('stroke = "120 mm"', 'stroke = "120 mm"\nbore = "100 mm"').replace("= 48", "= 240") + GAS,

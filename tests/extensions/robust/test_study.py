@@ -32,8 +32,11 @@ KILOPOND = 9.80665
 
 def test_long_words_over_neighbouring_lines_keep_apart() -> None:
     """Of a kilopond and ten: their names are longer than the distance of the lines."""
-    told = {"mark_names": ["worst sum, a source", "free force, a source"], "mark_forces": [GRAVITY, 10.0 * GRAVITY]}
-    first, second = (mark for mark in _marks(xr.Dataset(attrs=told), 3) if isinstance(mark, Words))
+    attributes = {
+        "mark_names": ["worst sum, a source", "free force, a source"],
+        "mark_forces": [GRAVITY, 10.0 * GRAVITY],
+    }
+    first, second = (mark for mark in _marks(xr.Dataset(attrs=attributes), 3) if isinstance(mark, Words))
     assert abs(first.y - second.y) >= 0.3
     (alone,) = (
         m for m in _marks(xr.Dataset(attrs={"mark_names": "a", "mark_forces": GRAVITY}), 3) if isinstance(m, Words)
@@ -85,8 +88,8 @@ def test_second_order_outweighs_the_worst_sum() -> None:
     tolerances = tolerances_of(0.010, 5e-4, 2, 5e-5, (30.0,))
     six = load(PROBLEMS / "tractor-six.toml")
     cases = [{"name": name, "problem": "x.toml"} for name in ("four", "six")]
-    told = {"kind": "tolerance", "name": "t", "title": "t", "tolerances": {"reciprocating_mass": "10 g"}}
-    part = ToleranceStudy.model_validate({**told, "cases": cases})
+    tables = {"kind": "tolerance", "name": "t", "title": "t", "tolerances": {"reciprocating_mass": "10 g"}}
+    part = ToleranceStudy.model_validate({**tables, "cases": cases})
     data = part.dataset([Point(case) for case in part.cases], [spread(one, tolerances, 700) for one in (problem, six)])
     four = data.sel(case="four")
     worst, nominal = float(four["worst"]) / KILOPOND, float(four["nominal"]) / KILOPOND

@@ -1,4 +1,4 @@
-"""Files of the study part on tolerances: what they say, and what bad ones are told."""
+"""Files of the study part on tolerances: what they say, and what bad ones are text_of_study."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from laufruhe.extensions.robust.study import verdicts
 from laufruhe.plots.picture import draw
 from laufruhe.studies.kinds import KINDS
 from problem_files import PROBLEMS
-from studies.parts import part_of, refused, told
+from studies.parts import part_of, refused, text_of_study
 
 TOLERANCE = f"""
 title = "t"
@@ -44,7 +44,7 @@ def test_tolerances_keep_to_the_file(tmp_path: Path) -> None:
     four, six = verdicts(data)
     assert four.agrees
     assert not six.agrees
-    table = told("tolerance", data)
+    table = text_of_study("tolerance", data)
     assert "| finer balancing, six | matters |" in table
     draw(KINDS["tolerance"].picture(data))
 

@@ -45,10 +45,10 @@ def read(folder: Path, text: str) -> Problem:
     ],
 )
 def test_forms(tmp_path: Path, words: str, size: float, law: Law, scope: Scope) -> None:
-    (told,) = tolerances_of(read(tmp_path, TEXT.format(words) + MOUNTS)).tolerances
-    assert told.size == pytest.approx(size)
-    assert (told.law, told.scope, told.unit) == (law, scope, "kg")
-    assert len(told.errors) == (1 if scope is Scope.BATCH else 4)
+    (tolerance,) = tolerances_of(read(tmp_path, TEXT.format(words) + MOUNTS)).tolerances
+    assert tolerance.size == pytest.approx(size)
+    assert (tolerance.law, tolerance.scope, tolerance.unit) == (law, scope, "kg")
+    assert len(tolerance.errors) == (1 if scope is Scope.BATCH else 4)
 
 
 def test_errors_move_what_they_are_of(tmp_path: Path) -> None:
@@ -97,11 +97,11 @@ def test_angles_of_throws(tmp_path: Path) -> None:
     assert throws == pytest.approx([0.0, 181.0, 179.5, 0.0])
 
 
-@pytest.mark.parametrize(("names", "told"), [
+@pytest.mark.parametrize(("names", "rotor_names"), [
     ([None], ["s"]), (["a"], ["s.a"]), ([None, None], ["s.1", "s.2"]), (["a", None, "b"], ["s.a", "s.2", "s.b"]),
 ])  # fmt: skip
 def test_errors_of_a_shaft_have_the_names_of_its_unbalances(
-    tmp_path: Path, names: list[str | None], told: list[str]
+    tmp_path: Path, names: list[str | None], rotor_names: list[str]
 ) -> None:
     weights = "".join(
         f'[[balancer_shafts.unbalances]]\nx = "{10 * k} mm"\nunbalance = "0.01 kg m ± 1 %"\n'
@@ -110,8 +110,8 @@ def test_errors_of_a_shaft_have_the_names_of_its_unbalances(
     )
     shafts = f'[[balancer_shafts]]\nname = "s"\nratio = 2\nposition = ["0 mm", "0 mm"]\n{weights}'
     problem = read(tmp_path, TEXT.format("") + MOUNTS + shafts)
-    assert {error.name for error in tolerances_of(problem).errors} == set(told)
-    assert set(told) <= {rotor.name for rotor in problem.engine.rotors}
+    assert {error.name for error in tolerances_of(problem).errors} == set(rotor_names)
+    assert set(rotor_names) <= {rotor.name for rotor in problem.engine.rotors}
 
 
 def test_draws_stay_within(tmp_path: Path) -> None:
@@ -134,10 +134,10 @@ def test_grades(tmp_path: Path) -> None:
     assert permitted_unbalance(6.3e-3, 60.0, 100.0 * math.pi) == pytest.approx(60.0 * 20.05e-6, rel=1e-3)
     text = TEXT.format("") + MOUNTS + '[tolerances]\nresidual_unbalance = "G 6.3"\nrotor_mass = "60 kg"\n'
     problem = read(tmp_path, text)
-    (told,) = tolerances_of(problem).tolerances
-    assert told.size == pytest.approx(0.5 * 60.0 * 20.05e-6, rel=1e-3)
+    (tolerance,) = tolerances_of(problem).tolerances
+    assert tolerance.size == pytest.approx(0.5 * 60.0 * 20.05e-6, rel=1e-3)
     own = with_errors(problem, np.array([0.0, 1.0, -1.0, 0.0]))
-    assert [rotor.unbalance for rotor in own.engine.rotors] == pytest.approx([1j * told.size, -told.size])
+    assert [rotor.unbalance for rotor in own.engine.rotors] == pytest.approx([1j * tolerance.size, -tolerance.size])
     assert [rotor.x for rotor in own.engine.rotors] == pytest.approx([0.1875, -0.1875])
     assert objective_value(own, evaluate(own)) != objective_value(problem, evaluate(problem))
 
@@ -193,6 +193,6 @@ def test_check_refuses_what_solve_does(tmp_path: Path) -> None:
     path = tmp_path / "heights.toml"
     path.write_text(changed(text, '"-100 mm"]', '{ between = ["-200 mm", "0 mm"] }]'), encoding="utf-8")
     for command in ("check", "solve"):
-        told = CliRunner().invoke(app, [command, str(path)])
-        assert told.exit_code == 2
-        assert "[robust] decides unbalances" in told.output
+        outcome = CliRunner().invoke(app, [command, str(path)])
+        assert outcome.exit_code == 2
+        assert "[robust] decides unbalances" in outcome.output

@@ -34,12 +34,12 @@ def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
 def test_limits_of_nothing() -> None:
     """A couple of 1 N m that is left needs that much less of both weights; no couple is under none."""
     result = solve(PROBLEMS / "rotary-four-open.toml")
-    told = {limit.name: limit.price for limit in result.limits}
+    prices = {limit.name: limit.price for limit in result.limits}
     speed = 8000.0 * math.tau / 60.0
-    price = told["maximum rocking couple"]
+    price = prices["maximum rocking couple"]
     assert price.relaxed == pytest.approx(2.0 / (0.56 * 0.05 * speed**2), rel=1e-3)
     assert price.tightened == math.inf
-    assert told["maximum shaking force"] == Price(0.0, math.inf)
+    assert prices["maximum shaking force"] == Price(0.0, math.inf)
 
 
 def test_weights_of_open_size_and_angle_are_found_by_their_names() -> None:

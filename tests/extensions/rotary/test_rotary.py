@@ -102,8 +102,8 @@ class TestGas:
         """Angle since each chamber fired, and what it holds over the crankcase."""
         whole = 6.0 * math.pi
         since = [(phi + math.tau * k) % whole for k in range(3)]
-        told = [float(pressure_at(GAS, UNIT, _of(UNIT).cycle, np.array([at]))[0]) for at in since]
-        return [(at, pressure - GAS.crankcase_pressure) for at, pressure in zip(since, told, strict=True)]
+        pressures = [float(pressure_at(GAS, UNIT, _of(UNIT).cycle, np.array([at]))[0]) for at in since]
+        return [(at, pressure - GAS.crankcase_pressure) for at, pressure in zip(since, pressures, strict=True)]
 
     @pytest.mark.parametrize("phi", [0.1, 1.3, 2.9, 4.4, 6.0])
     def test_torque_is_pressure_times_growth_of_the_chamber(self, phi: float) -> None:
@@ -160,8 +160,8 @@ class TestGas:
         angles = np.linspace(0.0, 6.0 * math.pi, 4321)[:-1]
         pressures = pressure_at(GAS, UNIT, _of(UNIT).cycle, angles)
         trace = PressureTrace(tuple(angles), tuple(pressures), GAS.crankcase_pressure)
-        found, wanted = (crank_torque(_of(UNIT), replace(self.point, gas=own)).sample(90) for own in (trace, GAS))
-        np.testing.assert_allclose(found, wanted, atol=1e-4 * np.abs(wanted).max())
+        found, expected = (crank_torque(_of(UNIT), replace(self.point, gas=own)).sample(90) for own in (trace, GAS))
+        np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())
 
 
 def _bodies(unit: RotaryUnit, phi: Array) -> tuple[Array, ComplexArray]:
@@ -201,9 +201,9 @@ def test_an_uneven_speed_loads_the_block_through_the_teeth() -> None:
     point = OperatingPoint("", 200.0, GAS)
     motion = crank_motion(_of(unit), point, uneven)
     tooth = INERTIA * motion.acceleration / 3.0 / (3.0 * E)
-    wanted = crank_torque(_of(unit), point).values(motion.angle) + tooth * 2.0 * E
+    expected = crank_torque(_of(unit), point).values(motion.angle) + tooth * 2.0 * E
     found = shaking_loads(_of(unit), point, uneven).sample(uneven.samples)[:, 3]
-    np.testing.assert_allclose(found, wanted, atol=1e-6 * np.abs(wanted).max())
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.slow

@@ -44,7 +44,7 @@ SIZES = (0.02, 0.1, 0.3)
 FLUID = {"mass": "25 kg", "bulge_stiffness": "260 N/mm", "damping": "500 N s/m"}
 
 
-def random_tables(seed: int, **asked: Any) -> dict[str, Any]:
+def random_tables(seed: int, **changes: Any) -> dict[str, Any]:
     """A single on three or four mounts with one to four stiffnesses open, of several kinds of damping."""
     r = np.random.default_rng(seed)
     count = int(r.integers(3, 5))
@@ -79,12 +79,12 @@ def random_tables(seed: int, **asked: Any) -> dict[str, Any]:
         "run_up": {
             "up_to": f"{rpm} rpm", "time": f"{r.uniform(0.2, 0.5)} s", "shut_down_time": f"{r.uniform(0.2, 0.6)} s",
         },
-        "objective": {"minimise": "run-up travel"}, "constraints": [], **asked,
+        "objective": {"minimise": "run-up travel"}, "constraints": [], **changes,
     }  # fmt: skip
 
 
-def random_problem(seed: int, **asked: Any) -> Problem:
-    return load_tables(random_tables(seed, **asked), Path("random.toml"))
+def random_problem(seed: int, **changes: Any) -> Problem:
+    return load_tables(random_tables(seed, **changes), Path("random.toml"))
 
 
 class Boxes:
@@ -193,11 +193,11 @@ def test_scipy_reaches_what_boxes_are_not_under() -> None:
     inertia, gas = run_loads(problem.engine, problem.points[0], problem.fidelity)
     for box in range(2):
         for x in boxes.designs(box, 2):
-            told = [
+            runs = [
                 run_through(boxes.model.mounting(x), inertia, gas, *each, 60, "DOP853", 1e-9)
                 for each in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
             ]
-            values = np.max([own.worst for own in told], axis=0)
+            values = np.max([own.worst for own in runs], axis=0)
             assert np.all(bounds[:, box] <= values * (1.0 + 1e-3))
         assert np.any(bounds[:, box] > 0.8 * values)
 
@@ -218,9 +218,9 @@ def test_long_steps_end_where_short_ones_do() -> None:
             ends = (first - 7) % 7 - 7 * (first > 0) + 7 * np.arange(len(long.impulses) + 1)
             inside = ends >= 0
             turned = of.turn[0] @ (y / of.scale), of.turn[0] @ rate
-            for own, told in zip(turned, (exact.y, exact.rate), strict=True):
-                size = np.abs(told).max()
-                assert np.abs(own[:, inside] - told[:, ends[inside]]).max() < 1e-9 * size
+            for own, exact_part in zip(turned, (exact.y, exact.rate), strict=True):
+                size = np.abs(exact_part).max()
+                assert np.abs(own[:, inside] - exact_part[:, ends[inside]]).max() < 1e-9 * size
 
 
 def test_roots_of_stiffness_are_as_near_as_they_say() -> None:
@@ -268,14 +268,14 @@ def test_what_moves_a_design_is_as_near_to_its_orders_as_they_say(seed: int) -> 
         middle, half = 0.5 * (boxes.lower + boxes.upper)[box], of.halves[box]
         for x in boxes.designs(box, 12):
             model, s = time_model(boxes.model.mounting(x)), (x - middle) / half
-            told = of.matrix[box] + np.tensordot(s, of.first[box], axes=1)
+            matrix = of.matrix[box] + np.tensordot(s, of.first[box], axes=1)
             second = sum(s[j] * s[k] * own for own, (j, k) in zip(of.second[box], pairs, strict=True))
             exact = turn.T @ model.stiffness @ turn, turn.T @ model.damping @ turn
             size = np.abs(exact[1]).max() + 1e-12
-            assert -scale * told[n:, :n] == pytest.approx(exact[0], rel=1e-9, abs=1e-9 * np.abs(exact[0]).max())
-            off = np.abs(exact[1] + (told + second)[n:, n:])
+            assert -scale * matrix[n:, :n] == pytest.approx(exact[0], rel=1e-9, abs=1e-9 * np.abs(exact[0]).max())
+            off = np.abs(exact[1] + (matrix + second)[n:, n:])
             assert np.all(off <= of.maps.remainder[box] * (1.0 + 1e-9) + 1e-9 * size)
-            bent = max(bent, float((np.abs(exact[1] + told[n:, n:]) - of.maps.remainder[box]).max()) / size)
+            bent = max(bent, float((np.abs(exact[1] + matrix[n:, n:]) - of.maps.remainder[box]).max()) / size)
     # the second order is needed
     assert bent > 1e-6 or not of.maps.bends.any()
 
@@ -291,7 +291,7 @@ def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
     for shares in ((1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
         own, curved, left = (share * each for share, each in zip(shares, (first, bends, rest), strict=True))
         of = SimpleNamespace(count=boxes, first=own, maps=SimpleNamespace(bends=curved, remainder=left))
-        told, maximum = _force(of, middle, by, bent), np.zeros((boxes, times))
+        bound, maximum = _force(of, middle, by, bent), np.zeros((boxes, times))
         for s in np.vstack([r.uniform(-1.0, 1.0, (20, sides)), r.choice([-1.0, 1.0], (20, sides))]):
             products = np.array([s[j] * s[k] for j, k in pairs])
             once, twice = np.einsum("j,bjmt->bmt", s, by), np.einsum("p,bpmt->bmt", products, bent)
@@ -300,8 +300,8 @@ def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
             unknown = r.choice([-1.0, 1.0], left.shape) * left
             force += unknown @ (middle + once + twice)[:, n:]
             maximum = np.maximum(maximum, np.linalg.norm(force, axis=1))
-        assert np.all(maximum <= told * (1.0 + 1e-12))
-        assert np.all(told <= 30.0 * maximum)
+        assert np.all(maximum <= bound * (1.0 + 1e-12))
+        assert np.all(bound <= 30.0 * maximum)
     # where nothing has a sign of its own the corner has all of what bends tell
     curved, by, bent = (np.abs(each) for each in (bends, by, bent))
     of = SimpleNamespace(count=boxes, first=0.0 * first, maps=SimpleNamespace(bends=curved, remainder=0.0 * rest))
@@ -346,10 +346,10 @@ def test_forces_within_a_step_exceed_those_at_its_ends_by_no_more_than_is_told(s
         force = _force(of, z0[None], z1[None, None], z2[None, None])[0]
         ends = [z[..., [0, -1]] for z in (z0[None], z1[None, None], z2[None, None])]
         size = np.full((1, 1), np.linalg.norm(load))
-        told = _between(of, step, *ends, step * size, size)[0, 0]
+        bound = _between(of, step, *ends, step * size, size)[0, 0]
         excess = np.trapezoid(force, times) / step - 0.5 * (force[0] + force[-1])
-        assert excess <= told * (1.0 + 1e-9) + 1e-12
-        tight.append(excess / (told or 1.0))
+        assert excess <= bound * (1.0 + 1e-9) + 1e-12
+        tight.append(excess / (bound or 1.0))
     assert max(tight) > 0.01
 
 
@@ -371,7 +371,7 @@ def test_a_motion_of_unit_energy_has_no_larger_signal_than_its_gain() -> None:
         )  # fmt: skip
         directions = r.normal(size=(boxes, places, d, times))
         directions /= np.linalg.norm(directions, axis=2, keepdims=True)
-        told, maximum = look._gains(directions), np.zeros((boxes, places, times))
+        bound, maximum = look._gains(directions), np.zeros((boxes, places, times))
         for s in np.vstack([r.uniform(-1.0, 1.0, (20, sides)), r.choice([-1.0, 1.0], (40, sides))]):
             position = maps.position + np.tensordot(s, maps.positions, axes=(0, 1))
             rate = maps.rate + np.tensordot(s, maps.rates, axes=(0, 1))
@@ -380,17 +380,17 @@ def test_a_motion_of_unit_energy_has_no_larger_signal_than_its_gain() -> None:
             # the largest signal along a direction is the length of its row
             along = [np.einsum("bpdt,bpdn->bptn", directions, m.reshape(boxes, places, d, n)) for m in (at_unit, rate)]
             maximum = np.maximum(maximum, np.linalg.norm(np.concatenate(along, axis=-1), axis=-1))
-        assert np.all(maximum <= told * (1.0 + 1e-12))
-        assert np.all(told <= 10.0 * maximum)
+        assert np.all(maximum <= bound * (1.0 + 1e-12))
+        assert np.all(bound <= 10.0 * maximum)
 
 
 @pytest.mark.slow
 def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
     """What no spring holds moves as far as it is pushed: nothing is said of it, and nothing false."""
-    told = random_tables(7)
-    for place in told["mounts"]["places"]:
+    tables = random_tables(7)
+    for place in tables["mounts"]["places"]:
         place["stiffness"] = [{"between": ["0 N/mm", "300 N/mm"], "start": "100 N/mm"}, "200 N/mm", "200 N/mm"]
-    problem = load_tables(told, Path("loose.toml"))
+    problem = load_tables(tables, Path("loose.toml"))
     model = BoxModel(problem, evaluate_start(problem))
     found = RunBoxes(model, OF_RUNS).under(OF_RUNS[1], model.lower[None], model.upper[None])
     assert minimum(found)[0] == -np.inf
@@ -399,10 +399,10 @@ def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
 def stopped(maximum: str, stiffness: str = "300 N/mm", further: tuple[str, ...] = (), **more: Any) -> Problem:
     """Return a problem with stops at 1.1 mm and limits of travel."""
     limits = [{"name": each, "limit": "run-up travel", "max": each} for each in (maximum, *further)]
-    told = random_tables(7, constraints=limits, **more)
-    for place in told["mounts"]["places"]:
+    tables = random_tables(7, constraints=limits, **more)
+    for place in tables["mounts"]["places"]:
         place["stop"] = {"gap": "1.1 mm", "stiffness": stiffness}
-    return load_tables(told, Path("stopped.toml"))
+    return load_tables(tables, Path("stopped.toml"))
 
 
 @pytest.mark.slow
@@ -429,14 +429,14 @@ def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
     assert "run-ups" in result.certificate.method
     given, r = evaluate(problem), np.random.default_rng(2)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
-    kept = met = 0
+    feasible = met = 0
     for x in low + (high - low) * r.random((50, len(low))):
         design = with_mounts(given, problem.design(x.tolist()))
         met += design.value(OF_RUNS[1]) > 1.1e-3
         if design.violation(problem.limits) <= 0.0:
-            kept += 1
+            feasible += 1
             assert objective_value(problem, design) >= result.certificate.lower_bound
-    assert min(kept, met) > 5
+    assert min(feasible, met) > 5
     many, value = replace(problem, search=replace(problem.search, boxes=80)), result.objective.value
     assert 0.97 * value < divided_bound(many, 1.5 * value, 0.05 * value).bound <= value * (1.0 + 1e-9)
 
@@ -457,8 +457,8 @@ def test_no_design_of_a_grid_is_under_the_bound(
 
     A bound is no more than the value it is asked for: asked whether all are half again worse, it stops at the best.
     """
-    asked: dict[str, Any] = {"objective": {"minimise": objective}, "search": {"starts": 1}}
-    bare = random_problem(seed, **asked)
+    settings: dict[str, Any] = {"objective": {"minimise": objective}, "search": {"starts": 1}}
+    bare = random_problem(seed, **settings)
     given = evaluate(bare)
     r = np.random.default_rng(seed)
     low, high = (np.array([getattr(d, side) for d in bare.mount_decisions]) for side in ("lower", "upper"))
@@ -468,7 +468,7 @@ def test_no_design_of_a_grid_is_under_the_bound(
         name, unit, scale = limit
         measure = next(m for m in OF_RUNS if m.name == name)
         maximum = float(np.quantile([design.value(measure) for design in designs], 0.2))
-        problem = random_problem(seed, **asked, constraints=[{"limit": name, "max": f"{maximum * scale} {unit}"}])
+        problem = random_problem(seed, **settings, constraints=[{"limit": name, "max": f"{maximum * scale} {unit}"}])
     values = [objective_value(problem, d) for d in designs if d.violation(problem.limits) <= 0.0]
     value = min(values)
     result = laufruhe.solve(problem)

@@ -49,8 +49,8 @@ def limited(seed: int, share: float) -> Problem:
 @pytest.mark.parametrize("seed", first_fast([10, 6, 9], 0, 1))
 def test_what_is_excluded_no_search_meets(seed: int) -> None:
     """Limits that random designs keep are not excluded; tighter ones are, and a search breaks them."""
-    kept = limited(seed, 1.02)
-    assert not are_contradictory(kept, kept.limits)
+    attainable = limited(seed, 1.02)
+    assert not are_contradictory(attainable, attainable.limits)
     problem = limited(seed, 0.7)
     assert are_contradictory(problem, problem.limits)
     low, high = sides(problem)
@@ -67,7 +67,7 @@ def test_what_is_excluded_no_search_meets(seed: int) -> None:
 @pytest.mark.slow
 def test_a_conflict_of_run_ups_is_named() -> None:
     """Three limits that no stiffness keeps, of which two are kept by some."""
-    asked = tables_of(READY)
+    tables = tables_of(READY)
     force = {"limit": "run-up force", "max": "300 N"}
-    problem = load_tables({**asked, "constraints": [*asked["constraints"], force]}, Path("single.toml"))
+    problem = load_tables({**tables, "constraints": [*tables["constraints"], force]}, Path("single.toml"))
     assert minimal_conflict(problem) == ("static sag", "run-up travel", "run-up force")

@@ -61,9 +61,9 @@ def test_a_linear_run_is_that_of_integration(limited: tuple[Problem, Result]) ->
         strict=True,
     ):  # fmt: skip
         mounting = mounting_in(engine)
-        told = run_through(mounting, inertia.truncated(12.0), None, first, last, seconds, 60, "DOP853", 1e-9)
+        exact = run_through(mounting, inertia.truncated(12.0), None, first, last, seconds, 60, "DOP853", 1e-9)
         for name in ("force", "travel", "twist"):
-            assert getattr(own, name) == pytest.approx(getattr(told, name), rel=2e-3)
+            assert getattr(own, name) == pytest.approx(getattr(exact, name), rel=2e-3)
 
 
 @pytest.mark.slow
@@ -78,16 +78,16 @@ def test_run_up_limits_hold_the_proven_optimum(limited: tuple[Problem, Result]) 
     assert force.value <= force.limit * (1.0 + 1e-5)
     free = laufruhe.solve(problem_of())
     assert free.objective.value < result.objective.value
-    rng, kept = np.random.default_rng(5), 0
+    rng, feasible = np.random.default_rng(5), 0
     inner = laufruhe.solve(problem_of(("run-up twist", "0.05 deg")))
     best, inside = (np.array([m.real, u.real, u.imag]) for m, u in map(columns, (result, inner)))
     for share in rng.random(30):
         mass, real, imag = best + share * (inside - best) + rng.normal(0.0, [0.01, 3e-4, 3e-4])
         other = evaluate(problem, problem.design([max(mass, 0.0), complex(real, imag)]))
         if other.violation(problem.limits) <= 0.0:
-            kept += 1
+            feasible += 1
             assert other.value(problem.objective[0].measure) >= result.certificate.lower_bound
-    assert kept > 3
+    assert feasible > 3
     ends = [laufruhe.solve(problem_of(("run-up twist", f"{angle} deg"), ("run-up force", "600 N")))
             for angle in (0.0595, 0.0605)]  # fmt: skip
     slope = (ends[0].objective.value - ends[1].objective.value) / np.radians(0.001)
@@ -104,8 +104,8 @@ def test_what_no_design_keeps_is_named() -> None:
 @pytest.mark.slow
 def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
     """Motion of a design is the sum of what rows tell of its weights; with stops no rows tell it."""
-    asked = "run-up travel", "1 mm"
-    problem = problem_of(asked)
+    limit = "run-up travel", "1 mm"
+    problem = problem_of(limit)
     (measure,) = simulated_measures(problem)
     rows = RunRows.from_problem(problem, [measure])
     values = [1.0, 0.02j]
@@ -116,31 +116,31 @@ def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
     mounts = tables_of(READY)["mounts"]
     stop = {"gap": "1 mm", "stiffness": "500 N/mm"}
     stopped = {**mounts, "places": [{**place, "stop": stop} for place in mounts["places"]]}
-    assert RunRows.from_problem(problem_of(asked, mounts=stopped), [measure]) is None
+    assert RunRows.from_problem(problem_of(limit, mounts=stopped), [measure]) is None
 
 
 def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
     """Steps of a run are gathered at 48 angles, at which no design keeps this force; over the cycle 7.073 N is kept."""
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183}]}
-    told = {
+    tables = {
         **SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [turned, right],
         **mounted(),
         "run_up": {"up_to": "3000 rpm", "time": "0.5 s"},
         "objective": {"minimise": "run-up travel"},
         "constraints": [{"limit": "mean mount force", "max": "7.0745 N"}],
     }  # fmt: skip
-    result = laufruhe.solve(load_tables(told, Path("mounted.toml")))
+    result = laufruhe.solve(load_tables(tables, Path("mounted.toml")))
     assert result.status is Status.OPTIMAL
 
 
 def test_limits_of_run_ups_are_not_excluded_beside_what_few_angles_read() -> None:
     travel = {"name": "travel", "limit": "run-up travel", "max": "1 m"}
-    asked = on_open_mounts(
+    problem = on_open_mounts(
         0, run_up={"up_to": "1500 rpm", "time": "0.2 s"}, objective={"minimise": "rms mount force"},
         constraints=[second(1.0001), travel],
     )  # fmt: skip
-    assert not are_contradictory(asked, asked.limits)
+    assert not are_contradictory(problem, problem.limits)
     tighter = on_open_mounts(0, objective={"minimise": "rms mount force"}, constraints=[second(0.99)])
     assert are_contradictory(tighter, tighter.limits)
 

@@ -60,8 +60,8 @@ def mounts(stop: dict[str, str] | None = None, **opened: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def ready() -> tuple[Problem, Result]:
-    told = tables(run_up=tables_of(READY)["run_up"], search={"starts": 1})
-    problem = load_tables(told, Path("single.toml"))
+    settings = tables(run_up=tables_of(READY)["run_up"], search={"starts": 1})
+    problem = load_tables(settings, Path("single.toml"))
     return problem, laufruhe.solve(problem)
 
 
@@ -153,13 +153,13 @@ def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
         own = [numbers[name] for name in order]
         x = np.array([*own, unbalance.real, unbalance.imag])
         engine = problem.design([unbalance, *own])
-        told = runs_of(engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
+        runs = runs_of(engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
         for coarser, maximum in ((1, 1e-9), (4, error)):
             peaks = RunPeaks(problem, OF_RUNS, coarser)
             parts = np.split(peaks.values(x), np.cumsum(peaks.counts)[:-1])
             for name, part in zip(("force", "travel", "twist"), parts, strict=True):
                 assert part.max() == pytest.approx(
-                    max(getattr(run, name).max() for run in told), rel=max(maximum, 1e-9)
+                    max(getattr(run, name).max() for run in runs), rel=max(maximum, 1e-9)
                 )
             slopes = peaks.slopes(x)
             at = [int(part.argmax()) + start for part, start in zip(parts, np.cumsum([0, *peaks.counts]), strict=False)]
@@ -178,9 +178,9 @@ def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
     for speed in range(360, 480, 10):
         run = {"up_to": f"{speed} rpm", "time": "0.3 s", "shut_down_time": "0.3 s"}
         problem = limited(mounts=given, run_up=run)
-        told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
+        runs = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
         peaks = RunPeaks(problem, OF_RUNS[:1])
-        for values, own in zip(np.split(peaks.values(np.array([1e-3])), 2), told, strict=True):
+        for values, own in zip(np.split(peaks.values(np.array([1e-3])), 2), runs, strict=True):
             assert values.max() == pytest.approx(own.force.max(), rel=1e-9)
         rows = peaks.rows([np.array([1e-3])])
         if rows is not None:
@@ -209,11 +209,11 @@ def test_a_design_of_which_one_run_is_not_followed_has_no_peaks() -> None:
 @pytest.mark.slow
 def test_runs_on_bump_stops_are_those_of_scipy() -> None:
     problem = limited(mounts=mounts(STOP))
-    told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
+    runs = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
     force, travel = by_scipy(problem.engine, problem)
     assert travel > 1.3e-3
-    assert max(run.force.max() for run in told) == pytest.approx(force, rel=1e-3)
-    assert max(run.travel.max() for run in told) == pytest.approx(travel, rel=1e-3)
+    assert max(run.force.max() for run in runs) == pytest.approx(force, rel=1e-3)
+    assert max(run.travel.max() for run in runs) == pytest.approx(travel, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -244,11 +244,11 @@ def test_weights_beside_stops_that_none_meets_are_those_of_the_cones() -> None:
     """With stops beyond reach of the proven best, that design stays one: the search finds none much worse."""
     shaft = tables_of(PROBLEMS / "soft-single-run-up.toml")["balancer_shafts"]
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
-    asked = {"objective": {"minimise": "run-up force"}, "balancer_shafts": shaft, "counterweights": [weight]}
-    proven = laufruhe.solve(limited(mounts=mounts(), **asked))
+    settings = {"objective": {"minimise": "run-up force"}, "balancer_shafts": shaft, "counterweights": [weight]}
+    proven = laufruhe.solve(limited(mounts=mounts(), **settings))
     assert proven.certificate.kind is Proof.GLOBAL
     assert proven.final.value(OF_RUNS[1]) < 0.9e-3
-    stopped = laufruhe.solve(limited(mounts=mounts(STOP), **asked))
+    stopped = laufruhe.solve(limited(mounts=mounts(STOP), **settings))
     assert stopped.certificate.kind is Proof.LOCAL
     assert stopped.objective.initial > 1.05 * proven.objective.initial
     assert stopped.objective.value == pytest.approx(proven.objective.value, rel=1e-3)
@@ -290,9 +290,9 @@ def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
         "120 N/mm",
         {"between": ["60 N/mm", "400 N/mm"], "start": "300 N/mm"},
     ]
-    asked = {"mounts": given, "objective": minimum, "search": {"starts": 1, "boxes": 1}}
-    mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), **asked))
-    both = laufruhe.solve(limited(("static sag", "5 mm"), counterweights=[weight], **asked))
+    settings = {"mounts": given, "objective": minimum, "search": {"starts": 1, "boxes": 1}}
+    mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), **settings))
+    both = laufruhe.solve(limited(("static sag", "5 mm"), counterweights=[weight], **settings))
     assert both.objective.value < mounts_alone.objective.value < mounts_alone.objective.initial
     # boxes of stiffness alone bound a run-up
     assert mounts_alone.certificate.lower_bound > 0.0
@@ -332,16 +332,16 @@ def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
 
 def test_fidelities_of_a_run_up_have_its_loads() -> None:
     """Without operating points there is no run."""
-    asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
-    assert all(own.points for _, own in ladder(Reference(limited(**asked))))
+    settings = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
+    assert all(own.points for _, own in ladder(Reference(limited(**settings))))
     assert any(not own.points for _, own in ladder(Reference(limited(objective={"minimise": "static sag"}))))
 
 
 @pytest.mark.slow
 def test_errors_of_run_ups_are_told_and_hold_at_finer_steps() -> None:
     """What stands between steps is no more than what is told, by those of SciPy; all orders stay for a run."""
-    asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
-    problem = limited(("run-up force", "1 kN"), **asked)
+    settings = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
+    problem = limited(("run-up force", "1 kN"), **settings)
     result = laufruhe.evaluate(problem)
     assert 1e-4 < result.error_estimate < 1e-2
     assert result.limits[0].error_estimate == pytest.approx(result.error_estimate)
@@ -365,11 +365,11 @@ def three(**more: Any) -> dict[str, Any]:
 @pytest.mark.slow
 def test_the_star_that_starts_with_least_travel_is_proven() -> None:
     """Both stars with their weights, each solved by itself: the better one is found, and bounds both."""
-    asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
-    opened = laufruhe.solve(limited(**asked, **three(throws="open", firing_order="open")))
+    settings = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
+    opened = laufruhe.solve(limited(**settings, **three(throws="open", firing_order="open")))
     assert opened.certificate.kind is Proof.GLOBAL
     given = [
-        laufruhe.solve(limited(**asked, **three(throws=throws, firing_order=order)))
+        laufruhe.solve(limited(**settings, **three(throws=throws, firing_order=order)))
         for throws, order in (([0, 240, 120], [1, 3, 2]), ([0, 120, 240], [1, 2, 3]))
     ]
     values = [result.objective.value for result in given]

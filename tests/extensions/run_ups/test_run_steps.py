@@ -83,8 +83,8 @@ def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> Non
     met = np.flatnonzero(model.stops)
     into = inverse @ model.travels[met].T
     for k, rate in enumerate(rates):
-        told = [side.first[0][2 * k : 2 * k + 2], side.second[0][2 * k : 2 * k + 2]]
-        for found, weight in zip(told, (lambda _: 1.0, lambda t: t / step), strict=True):
+        integrals = [side.first[0][2 * k : 2 * k + 2], side.second[0][2 * k : 2 * k + 2]]
+        for found, weight in zip(integrals, (lambda _: 1.0, lambda t: t / step), strict=True):
             real, imaginary = (
                 quad(
                     lambda t, part=part, rate=rate, weight=weight: part(np.exp(rate * (step - t))) * weight(t), 0, step

@@ -36,17 +36,17 @@ def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
     """The best design without a run-up stays proven if it keeps the limit of the run-up."""
     soft += "[search]\nstarts = 1\n"
     alone = laufruhe.solve(loaded(tmp_path, soft))
-    kept = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))
-    assert kept.objective.value == pytest.approx(alone.objective.value)
-    assert kept.certificate.kind == alone.certificate.kind
-    found = next(limit for limit in kept.limits if limit.name == "run-up travel")
+    result = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))
+    assert result.objective.value == pytest.approx(alone.objective.value)
+    assert result.certificate.kind == alone.certificate.kind
+    found = next(limit for limit in result.limits if limit.name == "run-up travel")
     assert 0.0 < found.value < 2e-3
-    record = as_dict(kept)["run_up"]
+    record = as_dict(result)["run_up"]
     assert record["up_to"] == pytest.approx(1000.0 * RPM)
     assert max(record[way]["travel"] for way in ("up", "down")) == found.value
     # integrated at ten times the steps and a thousandth of the tolerance
-    design = kept.final
-    point = min(kept.problem.points, key=lambda p: p.speed)
+    design = result.final
+    point = min(result.problem.points, key=lambda p: p.speed)
     loads = split_loads(design.engine, point, design.fidelity)
     fine = run_through(mounting_in(design.engine), *loads, 0.0, 1000.0 * RPM, 0.5, 600, tolerance=1e-8)
     assert record["up"]["travel"] == pytest.approx(fine.travel.max(), rel=1e-2)

@@ -198,9 +198,9 @@ def test_pictures_are_those_of_what_was_solved_last() -> None:
 
 def test_the_state_is_saved_as_a_problem_that_evaluates_alike(tight: dict[str, Any], tmp_path: Path) -> None:
     state = PageState(edits=(TIGHT,), design=tight["design"])
-    told = json.loads(answers.save(source(LANCHESTER), state))
-    path = tmp_path / told["file"]
-    path.write_text(told["toml"], encoding="utf-8")
+    record = json.loads(answers.save(source(LANCHESTER), state))
+    path = tmp_path / record["file"]
+    path.write_text(record["toml"], encoding="utf-8")
     found = laufruhe.evaluate(path)
     assert found.objective is not None
     # at fewer angles than it was proven at

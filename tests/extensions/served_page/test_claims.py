@@ -171,9 +171,9 @@ def test_words_of_what_is_simpler() -> None:
     assert not Simplification()
     both = Simplification(("these mounts", "this crank"), ("tolerances",))
     assert both.phrase == " for these mounts and this crank without tolerances"
-    told = conflict_claim(3, ("a", "b"), Simplification(("these mounts",)))
-    assert told.lead == "No design found:"
-    assert told.words == "'a' and 'b' contradict each other for these mounts. Move one of the limits"
+    claim = conflict_claim(3, ("a", "b"), Simplification(("these mounts",)))
+    assert claim.lead == "No design found:"
+    assert claim.words == "'a' and 'b' contradict each other for these mounts. Move one of the limits"
     assert conflict_claim(3, ("a",), is_last=True).lead == "No design exists:"
 
 

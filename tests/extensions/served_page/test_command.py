@@ -81,8 +81,8 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
     running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert running.stdout is not None
     address = running.stdout.readline().partition(": ")[2].strip()
-    told = answer(address, "/begin", {})
-    assert (told["title"], told["file"]) == ("Tractor four-cylinder with a Lanchester balancer", "mine.toml")
+    answered = answer(address, "/begin", {})
+    assert (answered["title"], answered["file"]) == ("Tractor four-cylinder with a Lanchester balancer", "mine.toml")
     found = answer(address, "/follow", {"edits": [["set", "constraints.1.max", "0.5 kg"]]})
     assert found["claim"]["kind"] == "estimate"
     running.send_signal(signal.SIGINT)

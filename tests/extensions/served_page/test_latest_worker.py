@@ -30,10 +30,10 @@ def at_work(desk: LatestWorker, askers: ThreadPoolExecutor, folder: Path) -> Ite
     """A request that the desk's process is at: it ends within, when the process is ended, or after that."""
     pipe = folder / "pipe"
     os.mkfifo(pipe)
-    asked = askers.submit(desk.ask, LONG, Path.read_bytes, pipe)
+    answer = askers.submit(desk.ask, LONG, Path.read_bytes, pipe)
     # opened once the process has opened it too
     with pipe.open("wb"):
-        yield asked
+        yield answer
 
 
 def test_the_newest_wins(tmp_path: Path) -> None:

@@ -217,10 +217,10 @@ def test_the_front_fills_in_and_a_point_is_a_design(shown: Page) -> None:
     expect(shown.locator("#front-state")).to_contain_text("done")
     assert shown.locator("#front circle").count() >= 20
     point = shown.locator("#front circle").nth(10)
-    told = point.get_attribute("aria-label") or ""
+    label = point.get_attribute("aria-label") or ""
     point.focus()
     shown.keyboard.press("Enter")
-    value = re.search(r": ([\d.]+) N;", told)
+    value = re.search(r": ([\d.]+) N;", label)
     assert value is not None
     shows(shown, float(value[1]), 2e-3)
     expect(shown.locator("#follows")).not_to_be_checked()
@@ -294,11 +294,11 @@ def test_limits_of_a_run_up_are_measured_when_sliders_rest(page: Page) -> None:
         expect(twist).to_contain_text("broken")
         expect(page.locator("[data-role=regret]")).to_contain_text("Breaks run-up twist")
         design = page.evaluate("laufruhePage.state.handle.design()")
-        told = float(twist.get_attribute("data-value") or "nan")
+        shown_value = float(twist.get_attribute("data-value") or "nan")
     problem = laufruhe.load(path)
     values = decided(problem, design)
     built = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
-    assert told == pytest.approx(built.check_limit(problem.limits[0]).value, rel=1e-9)
+    assert shown_value == pytest.approx(built.check_limit(problem.limits[0]).value, rel=1e-9)
 
 
 def test_on_a_phone_the_optimum_stays_in_sight_and_groups_are_folded(shown: Page) -> None:

@@ -31,7 +31,7 @@ def server() -> Iterator[Server]:
     made.server_close()
 
 
-def asked(
+def request(
     server: Server, path: str = "/told", body: bytes = b"{}", method: str = "POST", **changes: str | None
 ) -> tuple[http.client.HTTPResponse, bytes]:
     host = server.guard.hosts[0]
@@ -52,7 +52,7 @@ def asked(
 
 
 def test_who_has_the_token_is_answered(server: Server) -> None:
-    answer, body = asked(server)
+    answer, body = request(server)
     assert answer.status == 200
     assert json.loads(body) == {"told": SECRET, "asked": {}}
     assert {name: answer.headers[name] for name in HEADERS} == dict(HEADERS)
@@ -82,7 +82,7 @@ def test_who_has_the_token_is_answered(server: Server) -> None:
     ],
 )
 def test_others_are_refused(server: Server, changes: dict[str, str | None], status: int) -> None:
-    answer, body = asked(server, **changes)
+    answer, body = request(server, **changes)
     assert answer.status == status
     assert SECRET.encode() not in body
     assert set(json.loads(body)) == {"error"}
@@ -91,25 +91,25 @@ def test_others_are_refused(server: Server, changes: dict[str, str | None], stat
 
 @pytest.mark.parametrize("body", [b"", b"{", b"NaN", b'{"a": Infinity}', b"\xff", b"[" * 60_000, b"null"])
 def test_what_is_no_json_is_refused(server: Server, body: bytes) -> None:
-    answer, told = asked(server, body=body)
+    answer, content = request(server, body=body)
     assert answer.status == 400
-    assert "error" in json.loads(told)
+    assert "error" in json.loads(content)
 
 
 @pytest.mark.parametrize("path", ["/../pyproject.toml", "//etc/passwd", "/page.py", "/%2e%2e/x", "/told", "/events"])
 def test_only_files_of_the_page_are_handed_out(server: Server, path: str) -> None:
-    answer, _ = asked(server, path, b"", "GET")
+    answer, _ = request(server, path, b"", "GET")
     assert answer.status == 404
 
 
 @pytest.mark.parametrize("method", ["PUT", "OPTIONS", "DELETE", "TRACE", "HEAD"])
 def test_no_other_method_is_known(server: Server, method: str) -> None:
-    answer, _ = asked(server, "/told", b"", method)
+    answer, _ = request(server, "/told", b"", method)
     assert answer.status == 501
 
 
 def test_the_page_itself_needs_no_token_and_holds_nothing(server: Server) -> None:
-    answer, body = asked(server, "/", b"", "GET", Origin=None)
+    answer, body = request(server, "/", b"", "GET", Origin=None)
     assert (answer.status, body) == (200, b"<!doctype html>")
     assert answer.headers.get_content_type() == "text/html"
     assert "unsafe" not in answer.headers["Content-Security-Policy"]
@@ -117,7 +117,7 @@ def test_the_page_itself_needs_no_token_and_holds_nothing(server: Server) -> Non
 
 
 def test_lines_come_one_by_one_and_the_connection_ends(server: Server) -> None:
-    answer, body = asked(server, "/lines")
+    answer, body = request(server, "/lines")
     assert (answer.status, body) == (200, b"1\n2\n")
     assert answer.headers["Connection"] == "close"
 
@@ -128,10 +128,10 @@ def test_a_ticket_is_good_once_and_the_address_in_a_list_of_processes_has_no_tok
     assert guard.token not in guard.ticket_address
     ticket = guard.ticket_address.partition("#o=")[2]
     words = {TOKEN.replace("-", "_"): None}
-    wrong, _ = asked(server, "/token", b'{"ticket": "x"}', **words)
-    _, first = asked(server, "/token", json.dumps({"ticket": ticket}).encode(), **words)
-    second, _ = asked(server, "/token", json.dumps({"ticket": ticket}).encode(), **words)
-    empty, _ = asked(server, "/token", b'{"ticket": ""}', **words)
+    wrong, _ = request(server, "/token", b'{"ticket": "x"}', **words)
+    _, first = request(server, "/token", json.dumps({"ticket": ticket}).encode(), **words)
+    second, _ = request(server, "/token", json.dumps({"ticket": ticket}).encode(), **words)
+    empty, _ = request(server, "/token", b'{"ticket": ""}', **words)
     assert json.loads(first) == {"token": guard.token}
     assert [wrong.status, second.status, empty.status] == [401, 401, 401]
 
@@ -152,7 +152,7 @@ def test_a_silent_connection_is_ended(server: Server, monkeypatch: pytest.Monkey
     with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as connection:
         connection.sendall(b"POST /told HTTP/1.1\r\n")
         assert connection.recv(1) == b""
-    assert asked(server)[0].status == 200
+    assert request(server)[0].status == 200
 
 
 def test_a_connection_carries_one_request(server: Server) -> None:
@@ -165,6 +165,6 @@ def test_a_connection_carries_one_request(server: Server) -> None:
 
 
 def test_nothing_of_a_request_is_written_down(server: Server, capfd: pytest.CaptureFixture[str]) -> None:
-    asked(server)
-    asked(server, Host="evil.example")
+    request(server)
+    request(server, Host="evil.example")
     assert capfd.readouterr() == ("", "")

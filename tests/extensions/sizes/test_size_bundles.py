@@ -65,9 +65,9 @@ def test_a_series_between_two_lengths_is_that_of_its_nodes() -> None:
     nodes = np.array([rows(length) for length in _lengths(low, high, terms)])
     series = RodSeries(piece, low, high, nodes, np.stack([nodes, 2.0 * nodes], axis=-1), np.zeros(3))
     for length in (low, 0.2, 0.31, high):
-        told = series.at_length(length)
-        assert told.constant == pytest.approx(rows(length), rel=1e-9)
-        assert told.slope[..., 1] == pytest.approx(2.0 * rows(length), rel=1e-9)
+        rows_at = series.at_length(length)
+        assert rows_at.constant == pytest.approx(rows(length), rel=1e-9)
+        assert rows_at.slope[..., 1] == pytest.approx(2.0 * rows(length), rel=1e-9)
 
 
 def test_rows_without_factors_are_summed_as_they_are() -> None:

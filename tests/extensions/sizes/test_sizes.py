@@ -130,9 +130,9 @@ def test_no_design_of_a_grid_beats_the_bound(solved: Result) -> None:
     best = math.inf
     for designs in (even, near):
         values, broken = plain(*designs)
-        kept = broken.max(axis=0) <= 1.0
-        assert kept.any()
-        best = min(best, float(values[kept].min()))
+        feasible = broken.max(axis=0) <= 1.0
+        assert feasible.any()
+        best = min(best, float(values[feasible].min()))
     assert best >= solved.certificate.lower_bound
     assert best == pytest.approx(solved.objective.value, rel=0.02)
 
@@ -385,7 +385,7 @@ def test_a_cut_off_that_moves_with_the_rod_is_left_out_of_the_bound() -> None:
     result = laufruhe.solve(problem)
     assert result.certificate.kind is Proof.WITHIN_GAP
     assert result.certificate.gap < 0.02
-    model, rng, kept = SizeModel(problem), np.random.default_rng(4), 0
+    model, rng, count = SizeModel(problem), np.random.default_rng(4), 0
     rows = model.fixed_rows(problem.limits[0].measure)
     assert all(0.9 < own.mean() < 1.0 for own in rows)
     found = np.array([entry.value for entry in result.decisions])
@@ -393,9 +393,9 @@ def test_a_cut_off_that_moves_with_the_rod_is_left_out_of_the_bound() -> None:
         x = np.clip(found * (1.0 + 0.02 * rng.standard_normal(2)), model.lower, model.upper)
         evaluation = evaluate(problem, problem.design(x.tolist()))
         if evaluation.violation(problem.limits) <= 0.0:
-            kept += 1
+            count += 1
             assert evaluation.value(problem.objective[0].measure) >= result.certificate.lower_bound
-    assert kept > 10
+    assert count > 10
 
 
 @pytest.mark.slow

@@ -99,7 +99,7 @@ def test_weights_beside_sizes_are_never_worse_and_neither_are_sizes_beside_weigh
 def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
     """Random boxes, designs and dual rows: none allowed lies under a bound, or in what was cut off."""
     model = SizeModel(problem)
-    boxes, rng, kept = SizeBoxes(model, solve_cone_program), np.random.default_rng(1), 0
+    boxes, rng, feasible = SizeBoxes(model, solve_cone_program), np.random.default_rng(1), 0
     domains = domains_of(problem.unbalances)
     measure = problem.objective[0].measure
     known: tuple = ()
@@ -117,14 +117,14 @@ def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
             evaluation = evaluate(problem, problem.design(design))
             assert model.value(measure, x, u) == pytest.approx(evaluation.value(measure), rel=1e-9)
             if evaluation.violation(problem.limits) <= 0.0:
-                kept += 1
+                feasible += 1
                 assert evaluation.value(measure) >= bound * (1.0 - 1e-9)
                 assert cut is not None
                 assert evaluation.value(measure) >= cut.bound * (1.0 - 1e-9)
                 assert np.all(cut.lower <= x)
                 assert np.all(x <= cut.upper)
         known = cut.multipliers if cut is not None else known
-    assert kept > 5
+    assert feasible > 5
 
 
 def test_stresses_that_no_sizes_and_weights_meet_are_named() -> None:

@@ -216,8 +216,8 @@ def test_eyes_of_the_rod_are_limits_on_its_pull(tmp_path: Path) -> None:
     bolts = evaluate(problem).value(Measure(*MEASURES["maximum bolt stress"], points=("exchange",)))
     assert bolts == pytest.approx(large / (2.0 * Bolts(1, 0.008).area), rel=1e-6)
     stresses = [small / (2.0 * area), small * arm / (2.0 * modulus), large / (2.0 * area)]
-    kept = [evaluate(problem).value(limit.measure) <= limit.maximum for limit in problem.limits]
-    assert kept == [stress <= allowed for stress in stresses]
+    within = [evaluate(problem).value(limit.measure) <= limit.maximum for limit in problem.limits]
+    assert within == [stress <= allowed for stress in stresses]
 
 
 def problem_limit(problem: Problem, limit: Limit) -> float:

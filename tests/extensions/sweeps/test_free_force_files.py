@@ -10,7 +10,7 @@ from laufruhe.extensions.sweeps.free_forces import count_agreeing
 from laufruhe.plots.picture import draw
 from laufruhe.studies.kinds import KINDS
 from problem_files import PROBLEMS
-from studies.parts import part_of, told
+from studies.parts import part_of, text_of_study
 
 LAYOUTS = f"""
 title = "t"
@@ -31,7 +31,7 @@ def test_free_forces_count_what_agrees(tmp_path: Path) -> None:
     data = part_of(tmp_path, LAYOUTS)
     assert count_agreeing(data) == (2, 3)
     assert np.isnan(float(data["force_printed"].sel(case="five", order=1)))
-    table = told("free forces", data)
+    table = text_of_study("free forces", data)
     assert "| five | 144 | 0 | 0.4490 (0.449) | 0 (0.001) | 4.9798 (4.9798) |" in table
     assert "2 of 3 printed values" in table
     draw(KINDS["free forces"].picture(data))

@@ -86,10 +86,10 @@ def wrench_of_places(part: SwingingYoke) -> np.ndarray:
 def test_loads_are_those_of_its_masses(part: SwingingYoke) -> None:
     engine = Engine("one", Cycle.TWO_STROKE, (part,))
     loads = shaking_loads(engine, OperatingPoint("run", SPEED)).sample(STEPS)
-    wanted = wrench_of_places(part)
-    size = np.abs(wanted).max()
-    assert pytest.approx(wanted, abs=1e-9 * size) == loads[:, [1, 2, 3]].T
-    assert pytest.approx(part.x * np.array([-wanted[1], wanted[0]]), abs=1e-9 * size) == loads[:, 4:].T
+    expected = wrench_of_places(part)
+    size = np.abs(expected).max()
+    assert pytest.approx(expected, abs=1e-9 * size) == loads[:, [1, 2, 3]].T
+    assert pytest.approx(part.x * np.array([-expected[1], expected[0]]), abs=1e-9 * size) == loads[:, 4:].T
 
 
 def test_torque_is_what_the_energy_loses() -> None:

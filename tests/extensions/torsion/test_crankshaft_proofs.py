@@ -34,8 +34,8 @@ def test_boxes_whose_absorber_gives_off_too_much_hold_no_design(heated: Problem)
     minimum = np.minimum(values[:-1], values[1:])
     # heat and twist go one way each, so that the ends of a box tell its least
     assert np.all(np.diff(heat) > 0.0)
-    kept = heat[:-1] <= limit.maximum
-    assert np.all(bounds[kept] <= minimum[kept] * (1.0 + 1e-9))
+    feasible = heat[:-1] <= limit.maximum
+    assert np.all(bounds[feasible] <= minimum[feasible] * (1.0 + 1e-9))
     assert np.all(np.isinf(bounds[heat[:-1] > 1.05 * limit.maximum]))
 
 

@@ -123,7 +123,7 @@ def test_boxes_exclude_no_pendulum_that_keeps_its_limit(order: float) -> None:
     text = text.replace('inertia = "0.0080277 kg m^2"', 'inertia = { between = ["0.004 kg m^2", "0.02 kg m^2"] }')
     problem = laufruhe.load(text.replace("orders = [4]", f"orders = [{order:g}]"))
     (limit,) = problem.limits
-    rng, told = np.random.default_rng(5), {True: 0, False: 0}
+    rng, counts = np.random.default_rng(5), {True: 0, False: 0}
     initial = evaluate(problem)
     for _ in range(45):
         own = replace(limit, outside=tuple(sorted(rng.uniform(1000.0, 9000.0, 2) / RPM)))
@@ -132,29 +132,29 @@ def test_boxes_exclude_no_pendulum_that_keeps_its_limit(order: float) -> None:
         (bound,), _ = boxes.bounds(ends[:1], ends[1:])
         inside = [evaluate(problem, problem.design(rng.uniform(*ends).tolist())) for _ in range(12)]
         keeps = [each.violation((own,)) <= 0.0 for each in inside]
-        told[math.isinf(bound)] += 1
+        counts[math.isinf(bound)] += 1
         assert not (math.isinf(bound) and any(keeps))
         # a narrow enough box of designs that all break it is excluded
         point = rng.uniform(*ends)
         (thin,), _ = boxes.bounds(point[None] * (1.0 - 1e-7), point[None] * (1.0 + 1e-7))
         at = evaluate(problem, problem.design(point.tolist())).violation((own,))
         assert math.isinf(thin) == (at > 0.0) or abs(at) < 1e-5
-    assert min(told.values()) > 3
+    assert min(counts.values()) > 3
 
 
 def test_ends_of_a_box_hold_the_critical_speeds_of_all_pendulums_in_it() -> None:
     """Counted from the highest; none are told where an inertia in the order goes through zero in the box."""
     text = (INPUTS / "pendulum-open.toml").read_text()
     text = text.replace('inertia = "0.0080277 kg m^2"', 'inertia = { between = ["0.004 kg m^2", "0.06 kg m^2"] }')
-    resonance, rng, told = InOrder(5.0), np.random.default_rng(3), {True: 0, False: 0}
+    resonance, rng, counts = InOrder(5.0), np.random.default_rng(3), {True: 0, False: 0}
     coordinates = TwistCoordinates(laufruhe.load(text.replace("orders = [4]", "orders = [5]")))
     for _ in range(30):
         lower, upper = np.sort(rng.uniform(coordinates.lower, coordinates.upper, (2, 2)), axis=0)
         ends = coordinates.ends(lower, upper, resonance)
-        told[ends is None] += 1
+        counts[ends is None] += 1
         for chain in [coordinates.chain(x) for x in rng.uniform(lower, upper, (6, 2))] if ends else ():
             low, own, high = (resonance.numbers(each)[::-1] for each in (ends[0], chain, ends[1]))
             assert len(low) == len(own) == len(high)
             assert np.all(low <= own * (1.0 + 1e-9))
             assert np.all(own <= high * (1.0 + 1e-9))
-    assert min(told.values()) > 3
+    assert min(counts.values()) > 3

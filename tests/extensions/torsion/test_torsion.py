@@ -33,9 +33,9 @@ from laufruhe.physics.uneven_speed import moving_inertia
 from problem_files import PROBLEMS
 
 
-def chain(inertias: list[float], stiffness: list[float], *absorbers: Absorber, **kept: float) -> Torsion:
-    discs = tuple(Disc(f"{k}", j, kept.get("damping", 0.0)) for k, j in enumerate(inertias))
-    loss = kept.get("loss_factor", 0.0)
+def chain(inertias: list[float], stiffness: list[float], *absorbers: Absorber, **losses: float) -> Torsion:
+    discs = tuple(Disc(f"{k}", j, losses.get("damping", 0.0)) for k, j in enumerate(inertias))
+    loss = losses.get("loss_factor", 0.0)
     return Torsion(discs, tuple(ShaftSection(f"{k}", s, loss_factor=loss) for k, s in enumerate(stiffness)), absorbers)
 
 

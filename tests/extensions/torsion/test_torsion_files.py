@@ -115,8 +115,8 @@ def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
     engine = load_tables(tables, Path("five.toml")).engine
     discs = chain(load_tables(tables, Path("five.toml"))).turning_inertia(engine.slider_cranks)
     assert discs == pytest.approx(5 * (0.006 + 0.5 * 0.045**2) + 0.008 + 0.14, rel=1e-12)
-    told = {"flywheel": {"inertia": f"{1.005 * discs:.6g} kg m^2"}}
-    assert load_tables({**tables, **told}, Path("five.toml")).engine.flywheel is not None
+    flywheel = {"flywheel": {"inertia": f"{1.005 * discs:.6g} kg m^2"}}
+    assert load_tables({**tables, **flywheel}, Path("five.toml")).engine.flywheel is not None
     ring = {"name": "d", "on": "pulley", "inertia": "0.1 kg m^2", "damping": "2 N m s/rad"}
     opened = [{**disc, "inertia": {"between": ["0.1 kg m^2", "0.2 kg m^2"]}} for disc in tables["torsion"]["discs"]]
     both = {"flywheel": {"inertia": f"{discs + 0.1:.6g} kg m^2"}}
@@ -126,7 +126,7 @@ def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
         (both, "differs from the 0.1831 kg m^2 that the discs of [torsion] have without pistons and rods"),
         ({"fidelity": {"crank_inertia": "1 kg m^2"}}, 'fidelity.crank_inertia = "1 kg m^2": differs from'),
         (free, "flywheel.inertia: is open, but the discs of [torsion] give the inertia of all rotating parts"),
-        ({**told, "torsion": {**tables["torsion"], "discs": opened}}, "follows from torsion.pulley.inertia"),
+        ({**flywheel, "torsion": {**tables["torsion"], "discs": opened}}, "follows from torsion.pulley.inertia"),
     ):
         with pytest.raises(InputError) as caught:
             load_tables({**tables, **more}, Path("five.toml"))

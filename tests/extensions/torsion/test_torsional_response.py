@@ -72,11 +72,11 @@ def test_chain_integrated_in_time(damped: tuple[Engine, OperatingPoint]) -> None
     inverse, none, one = np.linalg.inv(matrices.M), np.zeros((count + 1, count + 1)), np.eye(count + 1)
     free = np.block([[none, one], [-inverse @ matrices.K, -inverse @ matrices.C]])
     # few orders keep the torque smooth; the load takes the mean at the flywheel
-    kept = replace(torques, coefficients=torques.coefficients[:25])
-    torque = np.zeros((count + 1, len(kept.coefficients)), dtype=complex)
-    torque[:count] = kept.coefficients.T
-    torque[count - 1, 0] -= kept.coefficients[0].real.sum()
-    driven, rates = np.concatenate([0.0 * torque, inverse @ torque]), 1j * point.speed * kept.orders
+    truncated = replace(torques, coefficients=torques.coefficients[:25])
+    torque = np.zeros((count + 1, len(truncated.coefficients)), dtype=complex)
+    torque[:count] = truncated.coefficients.T
+    torque[count - 1, 0] -= truncated.coefficients[0].real.sum()
+    driven, rates = np.concatenate([0.0 * torque, inverse @ torque]), 1j * point.speed * truncated.orders
 
     def slope(t: float, state: np.ndarray) -> np.ndarray:
         return free @ state + (driven @ np.exp(rates * t)).real

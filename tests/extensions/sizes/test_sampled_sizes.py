@@ -46,14 +46,14 @@ def test_a_bound_of_sizes_is_not_over_a_rival_that_many_angles_judge() -> None:
 @pytest.mark.parametrize(("throw", "share", "met"), [(0, 0.998, False), (3, 1.0005, True)])
 def test_limits_of_sizes_are_what_the_cycle_has(throw: float, share: float, met: bool) -> None:
     """48 angles have half a percent too little of it at a throw of none, a quarter too much at 3 deg."""
-    told = sized(throw)
+    tables = sized(throw)
     minimum = of_many_angles(throw).objective.value
     limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{share * minimum} N"}
-    more = {"constraints": [*told["constraints"], limit], "search": {"boxes": 200}}
-    asked = problem(told, objective={"minimise": "rms shaking force"}, **more)
-    result = solve(asked)
+    more = {"constraints": [*tables["constraints"], limit], "search": {"boxes": 200}}
+    case = problem(tables, objective={"minimise": "rms shaking force"}, **more)
+    result = solve(case)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= FEASIBILITY_TOL
+    assert not met or with_fine_sampling(result.final).violation(case.limits) <= FEASIBILITY_TOL
 
 
 def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
@@ -65,13 +65,13 @@ def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
 
 def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> None:
     """48 angles have half a percent too little of the second order; no time is left to look at more."""
-    told = sized(0)
+    tables = sized(0)
     maximum = 0.998 * of_many_angles(0).objective.value
     limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{maximum} N"}
-    asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
+    case = problem(tables, objective={"minimise": "rms shaking force"}, constraints=[*tables["constraints"], limit])
     with limit_time(1e-9):
-        result = refine_sampling(asked, solve_sizes)
-    assert with_fine_sampling(result.final).violation(asked.limits) > FEASIBILITY_TOL
+        result = refine_sampling(case, solve_sizes)
+    assert with_fine_sampling(result.final).violation(case.limits) > FEASIBILITY_TOL
     assert result.status is Status.FAILED
     assert result.certificate is not None
     assert result.certificate.kind is Proof.NONE

@@ -31,13 +31,13 @@ WEIGHT = {"name": "w", "x": "0 mm", "angle": 180, "radius": "1 m", "unbalance": 
 QUIET = {"limit": "mean shaking force", "orders": [2], "name": "second"}
 
 
-def problem(**told: Any) -> Problem:
-    return load_tables({**SINGLE, **told}, Path("built.toml"))
+def problem(**changes: Any) -> Problem:
+    return load_tables({**SINGLE, **changes}, Path("built.toml"))
 
 
-def heaviest(asked: Problem) -> float:
+def heaviest(nominal: Problem) -> float:
     """The objective of the engine with the heaviest piston, which is the worst, at many angles."""
-    own = with_errors(asked, np.ones(tolerances_of(asked).count))
+    own = with_errors(nominal, np.ones(tolerances_of(nominal).count))
     return objective_value(own, evaluate(own, samples=5760))
 
 
@@ -45,27 +45,27 @@ def heaviest(asked: Problem) -> float:
 @pytest.mark.parametrize("throw", [0, 3])
 def test_the_worst_case_is_that_of_many_angles(throw: float, weights: list[Any]) -> None:
     """No weight moves the second order; 48 angles have 0.6 % too little of it, or a quarter of a percent too much."""
-    asked = problem(engine={**ENGINE, "throws": [throw]}, counterweights=weights, objective=SECOND)
-    result = solve(asked)
+    case = problem(engine={**ENGINE, "throws": [throw]}, counterweights=weights, objective=SECOND)
+    result = solve(case)
     assert result.objective is not None
     assert result.certificate is not None
-    assert result.objective.value == pytest.approx(heaviest(asked), rel=asked.tolerance)
-    assert result.certificate.lower_bound <= heaviest(asked) * (1.0 + 1e-9)
+    assert result.objective.value == pytest.approx(heaviest(case), rel=case.tolerance)
+    assert result.certificate.lower_bound <= heaviest(case) * (1.0 + 1e-9)
     assert result.status is Status.OPTIMAL
 
 
 @pytest.mark.parametrize(("throw", "samples"), [(1, 120), (2, 240), (5, 480), (0, 1440)])
 def test_no_bound_is_over_what_an_engine_has(throw: float, samples: int) -> None:
     """With nothing open it is that of an engine; few angles read it too large by less than the tolerance too."""
-    asked = problem(engine={**ENGINE, "throws": [throw]}, objective=SECOND, fidelity={"samples": samples})
-    result = solve(asked)
+    case = problem(engine={**ENGINE, "throws": [throw]}, objective=SECOND, fidelity={"samples": samples})
+    result = solve(case)
     assert result.certificate is not None
-    assert heaviest(asked) * (1.0 - asked.tolerance) <= result.certificate.lower_bound <= heaviest(asked) * (1.0 + 1e-9)
+    assert heaviest(case) * (1.0 - case.tolerance) <= result.certificate.lower_bound <= heaviest(case) * (1.0 + 1e-9)
 
 
 def test_what_a_share_of_engines_stays_below_is_that_of_many_angles() -> None:
-    told = {"objective": SECOND, "robust": {"over": "90 %", "engines": 40}}
-    few, many = (solve(problem(**told, fidelity={"samples": n})) for n in (48, 1440))
+    tables = {"objective": SECOND, "robust": {"over": "90 %", "engines": 40}}
+    few, many = (solve(problem(**tables, fidelity={"samples": n})) for n in (48, 1440))
     assert few.objective is not None
     assert many.objective is not None
     assert few.objective.value == pytest.approx(many.objective.value, rel=1e-4)
@@ -73,8 +73,8 @@ def test_what_a_share_of_engines_stays_below_is_that_of_many_angles() -> None:
 
 def test_the_worst_of_drawn_engines_is_that_of_many_angles() -> None:
     engine = {**ENGINE, "rod_ratio": "0.3 ± 3 %", "reciprocating_mass": "1 kg"}
-    told = {"engine": engine, "objective": SECOND, "robust": {"over": "worst case", "engines": 20}}
-    few, many = (solve(problem(**told, fidelity={"samples": n})) for n in (48, 1440))
+    tables = {"engine": engine, "objective": SECOND, "robust": {"over": "worst case", "engines": 20}}
+    few, many = (solve(problem(**tables, fidelity={"samples": n})) for n in (48, 1440))
     assert few.objective is not None
     assert many.objective is not None
     assert few.objective.value == pytest.approx(many.objective.value, rel=1e-4)
@@ -82,22 +82,22 @@ def test_the_worst_of_drawn_engines_is_that_of_many_angles() -> None:
 
 def test_the_error_told_is_that_of_the_worst_engine() -> None:
     """Samples are judged on the engine that the objective is of, not on the drawing."""
-    asked = problem(counterweights=[WEIGHT], objective=SECOND)
-    result = solve(asked)
+    case = problem(counterweights=[WEIGHT], objective=SECOND)
+    result = solve(case)
     assert isinstance(result.details, RobustResult)
-    assert objective_value(asked, result.measured) == pytest.approx(result.objective.value, rel=1e-3)  # type: ignore[union-attr]
+    assert objective_value(case, result.measured) == pytest.approx(result.objective.value, rel=1e-3)  # type: ignore[union-attr]
     assert result.measured is result.details.worst_engine
 
 
 @pytest.mark.parametrize("rod_ratio", [0.3, "0.3 ± 3 %"], ids=["every error", "drawn"])
 def test_nothing_open_that_breaks_a_limit_in_some_engine_is_infeasible(rod_ratio: float | str) -> None:
     """The drawing keeps it; what the limit can reach is what the worst engine has."""
-    told = {"engine": {**ENGINE, "rod_ratio": rod_ratio}, "robust": {"over": "worst case", "engines": 20}}
-    free = problem(**told, objective=SECOND)
+    tables = {"engine": {**ENGINE, "rod_ratio": rod_ratio}, "robust": {"over": "worst case", "engines": 20}}
+    free = problem(**tables, objective=SECOND)
     worst, drawn = solve(free), evaluate(free, samples=5760)
     assert worst.objective is not None
     limit = {**QUIET, "max": f"{0.5 * (objective_value(free, drawn) + worst.objective.value)!r} N"}
-    result = laufruhe.solve(problem(**told, objective=SECOND, constraints=[limit]))
+    result = laufruhe.solve(problem(**tables, objective=SECOND, constraints=[limit]))
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("second",)
     assert result.objective is None
@@ -109,27 +109,27 @@ def test_nothing_open_that_breaks_a_limit_in_some_engine_is_infeasible(rod_ratio
 @pytest.mark.parametrize("over", ["worst case", "90 %"])
 def test_a_drawing_with_nothing_open_that_breaks_a_limit_is_infeasible(over: str) -> None:
     limit = {"limit": "added mass", "max": "1 kg", "name": "light"}
-    told = {"objective": SECOND, "constraints": [limit], "robust": {"over": over, "engines": 20}}
+    tables = {"objective": SECOND, "constraints": [limit], "robust": {"over": over, "engines": 20}}
     weight = {"name": "w", "x": "0 mm", "angle": 180, "radius": "50 mm", "mass": "2 kg"}
-    assert solve(problem(**told, counterweights=[weight])).status is Status.INFEASIBLE
-    assert solve(problem(**told, counterweights=[{**weight, "mass": "0.5 kg"}])).status.has_design
+    assert solve(problem(**tables, counterweights=[weight])).status is Status.INFEASIBLE
+    assert solve(problem(**tables, counterweights=[{**weight, "mass": "0.5 kg"}])).status.has_design
 
 
-@pytest.mark.parametrize(("share", "told"), [(1.0005, Status.OPTIMAL), (0.998, Status.INFEASIBLE)])
+@pytest.mark.parametrize(("share", "status"), [(1.0005, Status.OPTIMAL), (0.998, Status.INFEASIBLE)])
 @pytest.mark.parametrize("throw", [0, 3])
-def test_few_angles_neither_break_nor_keep_a_limit_with_nothing_open(throw: int, share: float, told: Status) -> None:
+def test_few_angles_neither_break_nor_keep_a_limit_with_nothing_open(throw: int, share: float, status: Status) -> None:
     engine = {**ENGINE, "throws": [throw]}
     worst = heaviest(problem(engine=engine, objective=SECOND))
     limit = {**QUIET, "max": f"{share * worst!r} N"}
     result = solve(problem(engine=engine, objective={"minimise": "rms shaking force"}, constraints=[limit]))
-    assert result.status is told
-    if told is Status.OPTIMAL:
+    assert result.status is status
+    if status is Status.OPTIMAL:
         assert result.limits[0].value <= result.limits[0].limit * (1.0 + FEASIBILITY_TOL)
 
 
 def test_built_engines_of_the_design_as_given_may_pass_a_limit_by_a_hair() -> None:
     """No program is known of that design, and one without angles was asked."""
-    asked = problem(
+    case = problem(
         **{
             "engine": {
                 "layout": "inline", "cycle": "four-stroke", "stroke": "0.103788 m", "rod_length": "0.165566 m",
@@ -145,39 +145,39 @@ def test_built_engines_of_the_design_as_given_may_pass_a_limit_by_a_hair() -> No
         robust={"over": "worst case"}, tolerance=1e-3, objective={"minimise": "maximum rocking couple"},
         constraints=[{"name": "quiet", "limit": "mean rocking couple", "max": "3766.81209972 N m"}],
     )  # fmt: skip
-    assert not solve(asked).status.has_design
+    assert not solve(case).status.has_design
 
 
 @pytest.mark.parametrize("throw", [0, 3])
 def test_time_that_is_over_leaves_no_proof_that_few_angles_alone_have(throw: float) -> None:
     """Of the heaviest piston, nothing open: 48 angles have 0.6 % too little, or a quarter of a percent too much."""
     engine = {**ENGINE, "throws": [throw]}
-    asked = problem(engine=engine, objective=SECOND)
+    case = problem(engine=engine, objective=SECOND)
     with limit_time(1e-9):
-        result = solve(asked)
+        result = solve(case)
     assert result.objective is not None
     assert result.certificate is not None
-    assert result.objective.value == pytest.approx(heaviest(asked), rel=1e-4)
-    assert result.certificate.lower_bound <= heaviest(asked) * (1.0 + 1e-9)
+    assert result.objective.value == pytest.approx(heaviest(case), rel=1e-4)
+    assert result.certificate.lower_bound <= heaviest(case) * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize(("throw", "share", "told"), [(0, 0.998, Status.INFEASIBLE), (3, 1.0005, Status.OPTIMAL)])
+@pytest.mark.parametrize(("throw", "share", "status"), [(0, 0.998, Status.INFEASIBLE), (3, 1.0005, Status.OPTIMAL)])
 def test_limits_of_built_engines_are_what_the_cycle_has_in_the_worst_of_them(
-    throw: float, share: float, told: Status
+    throw: float, share: float, status: Status
 ) -> None:
     """No weight moves the second order. The drawing is far from the limit, and tells nothing of how few angles read."""
     engine = {**ENGINE, "throws": [throw]}
     weight = {"name": "w", "x": "0 mm", "angle": 180, "radius": "1 m", "unbalance": {"between": ["0 kg m", "0.1 kg m"]}}
     limit = {"limit": "mean shaking force", "orders": [2], "name": "second"}
-    asked = {
+    case = {
         "engine": engine, "counterweights": [weight], "robust": {"over": "worst case", "engines": 100},
         "objective": {"minimise": "rms shaking force"},
     }  # fmt: skip
-    free = problem(**asked, constraints=[{**limit, "max": "1e6 N"}])
+    free = problem(**case, constraints=[{**limit, "max": "1e6 N"}])
     heaviest = evaluate(with_errors(free, np.ones(1)), samples=5760).value(free.limits[0].measure)
-    result = solve(problem(**asked, constraints=[{**limit, "max": f"{share * heaviest!r} N"}]))
-    assert result.status is told
-    if told is Status.OPTIMAL:
+    result = solve(problem(**case, constraints=[{**limit, "max": f"{share * heaviest!r} N"}]))
+    assert result.status is status
+    if status is Status.OPTIMAL:
         assert result.limits[0].value == pytest.approx(heaviest, rel=1e-6)
 
 

@@ -49,7 +49,7 @@ def weight(name: str, f: np.ndarray) -> np.ndarray:
     return out
 
 
-class Felt:
+class PlainReceivers:
     """Responses of the receivers of a file in one of its designs."""
 
     def __init__(self, path: Path) -> None:
@@ -106,12 +106,12 @@ class Felt:
         out = None
         for j in np.flatnonzero(counts):
             w = 2.0 * math.pi * f[j]
-            felt = self._felt(design, receiver, w, on_ground[j], wrench[j])
-            out = np.zeros((len(f), len(felt)), dtype=complex) if out is None else out
-            out[j] = [x * weight(name, f[j : j + 1])[0] for x, name in zip(felt, names, strict=False)]
+            responses = self._responses(design, receiver, w, on_ground[j], wrench[j])
+            out = np.zeros((len(f), len(responses)), dtype=complex) if out is None else out
+            out[j] = [x * weight(name, f[j : j + 1])[0] for x, name in zip(responses, names, strict=False)]
         return np.fft.irfft(out if out is not None else np.zeros((len(f), 1)), steps, axis=0)
 
-    def _felt(
+    def _responses(
         self, design: Evaluation, receiver: Table, w: float, on_ground: np.ndarray, wrench: np.ndarray
     ) -> np.ndarray:
         engine = design.engine
