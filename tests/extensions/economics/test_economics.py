@@ -94,7 +94,7 @@ def test_limits_that_cannot_be_met_are_named() -> None:
 
 @pytest.fixture(scope="module")
 def four() -> xr.Dataset:
-    """With the reciprocating mass that the study prints."""
+    """Return the study with the reciprocating mass that is printed."""
     return _four("1.25 kg")
 
 
@@ -139,7 +139,7 @@ def test_every_number_of_its_csv_file_has_its_unit(four: xr.Dataset) -> None:
 
 @pytest.mark.slow
 def test_each_reading_of_the_force_is_least_for_the_designs_that_it_decides(four: xr.Dataset) -> None:
-    """What no shaft can balance is left out by default, and both readings of every optimum are in the table."""
+    """Check that each reading of the force is least for its own optimum, and the table has both."""
     assert Economics.model_fields["alternating"].default is True
     other = _four("1.25 kg", alternating=True)
     # proven to 1e-4

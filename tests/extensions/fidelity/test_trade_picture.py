@@ -1,4 +1,4 @@
-"""Every fidelity of a trade is named in its picture, however many fall on one spot."""
+"""Names of all fidelities in the picture of a trade, also where points coincide."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def test_enumeration_equals_plain_permutations(throws):
 @settings(max_examples=40)
 @given(st.integers(3, 7), st.sampled_from(sorted(OBJECTIVES)), st.floats(0.2, 1.5), st.data())
 def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
-    """What a window holds is found whole, and no star that is worth as little lies outside."""
+    """Check that the stars of a window are all those in its range, and that no better star is outside."""
     mirror, reflect = data.draw(st.booleans()), data.draw(st.booleans())
     space = replace(whole(throws), mirror=mirror, reflect=reflect)
     objective = OBJECTIVES[name]
@@ -132,7 +132,7 @@ def test_rearranged_throws_meet_in_every_star_of_a_window_and_no_other(seed, ord
 
 @pytest.mark.parametrize("throws", [5, 8, 11])
 def test_some_throws_are_arranged_in_every_order(throws):
-    """Of free throws all orders are met where the window is wide, and the others stay."""
+    """Check that a wide window gives all 24 orders of four free throws and leaves the others in place."""
     space, free = (
         replace(whole(throws), reflect=False),
         Free.from_throws(np.arange(throws, dtype=np.uint8), (1, 2, 3, 4)),
@@ -272,7 +272,7 @@ def test_a_search_that_nothing_is_left_of_ends(throws):
 
 
 def test_a_piece_may_be_left_without_stars(monkeypatch):
-    """All that stand in pieces may be excluded before the pieces are many."""
+    """Check the best star if the stars of a piece are all excluded before the search shares its work."""
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
     monkeypatch.setattr(star_search, "STARTS", 40)
     space, objective = whole(7), OBJECTIVES["one order"]
@@ -282,7 +282,7 @@ def test_a_piece_may_be_left_without_stars(monkeypatch):
 
 
 def test_a_piece_without_an_answer_leaves_the_search_open(monkeypatch):
-    """What nobody looked at may hold a better star: nothing is proven but what holds of every star."""
+    """Check that a search with a lost piece proves only the bound of all stars."""
     given, objective, space = star_search.unordered_map, OBJECTIVES["rms of four"], whole(6)
 
     def all_but_one(work, pieces, *more, **keys):

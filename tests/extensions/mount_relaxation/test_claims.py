@@ -1,4 +1,4 @@
-"""What spring forces claim: bounds of boxes of any width, none over a known design, none of what they do not name."""
+"""Claims of the bounds by spring forces: boxes of any width, no bound above a known design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of all mounts of a box: no design stands outside of it, and limits at rest are told as they are."""
+"""Sets of all mounts of a box, and limits at rest, compared with random designs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ max = "2500 N/mm"
 
 
 def designs(problem: Problem, count: int, seed: int = 0) -> list[np.ndarray]:
-    """Of the whole box, its ends among them."""
+    """Return random mount numbers of the whole box and its two ends."""
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     return [*np.random.default_rng(seed).uniform(low, high, (count, len(low))), low, high]
 
@@ -84,7 +84,7 @@ def test_limits_on_frequencies_are_those_of_the_stiffness(tmp_path: Path) -> Non
 
 
 def test_a_total_stiffness_outside_is_told_as_a_share_of_its_limit(tmp_path: Path) -> None:
-    """Of boxes of no width, whose stiffness is one number."""
+    """Compare violations of a forbidden band of total stiffness with traces, in boxes of no width."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS, LIMITS.replace("natural frequencies", "static sag")
                          .replace('min = "4 Hz"\n', "").replace("16 Hz", "1 m"))  # fmt: skip
     rest, seen = RestLimits(problem), set()

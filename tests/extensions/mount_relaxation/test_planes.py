@@ -11,7 +11,7 @@ from laufruhe.extensions.mount_relaxation.parameter_maps import PlaneStiffness
 
 
 def planes(generator: np.random.Generator, count: int) -> list[PlaneStiffness]:
-    """Of every width, with angles in all quarters."""
+    """Return random plane stiffnesses of every width, with angles in all quarters."""
     found = []
     for _ in range(count):
         low = 10.0 ** generator.uniform(0.0, 2.0, 2)

@@ -1,4 +1,4 @@
-"""What the forces of springs prove of a box of mounts: no design allowed is under it (E42-E45, E52-E54)."""
+"""Bounds of a box of mounts by spring forces, compared with designs and searches (E42-E45, E52-E54)."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_open_springs_add_up_to_what_the_matrices_change_by(tmp_path: Path) -> N
 
 @dataclass(frozen=True)
 class Truth:
-    """What a design has of an order, and where that stands in the relaxation."""
+    """Quantities of one order of a design, and their values in the variables of the relaxation."""
 
     numbers: np.ndarray
     vector: np.ndarray
@@ -112,7 +112,7 @@ class Truth:
 def truth(
     problem: Problem, whole: OpenMounts, mounts: OpenMounts, order: Any, line: Any, x: np.ndarray, u: np.ndarray
 ) -> Truth:
-    """By solving for the motion anew, of all motions or of half of them."""
+    """Return the quantities of a design from a new solution for the motion, of all motions or of one half."""
     mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
     stiffness, loss, damping = (
         mounts.root @ mounting.total(each) @ mounts.root.T
@@ -146,7 +146,7 @@ def truth(
 
 
 def matrices_of(mounts: OpenMounts, mounting: Any, spring: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Of a design and at the middle what a spring tells of: stiffness, or dampers alone."""
+    """Return the matrices of a design and at the middle of a spring: stiffness, or dampers alone."""
     return (mounting.springs, mounts.middles) if spring.elastic else (mounting.dampers, mounts.dampers)
 
 
@@ -648,7 +648,7 @@ def test_no_design_on_hydraulic_mounts_moves_more_than_is_told() -> None:
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
 def test_what_is_a_share_of_a_norm_may_be_so_much_larger(share: float, tmp_path: Path) -> None:
-    """Where a norm is at most one number, a root that is half of it is at most twice that, its square four times."""
+    """Check that a root with a share of the norm is cut off at the norm over this share."""
     boxes = asked_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + OBJECTIVES["rms"]))
     ((variable,), *_), look = boxes._variables, boxes._box(0, boxes.lower, boxes.upper)
     whole, part = (

@@ -68,7 +68,7 @@ def test_forces_with_a_lead_are_those_of_the_masses(tmp_path: Path) -> None:
 
 
 def test_two_that_turn_alike_are_best_half_a_turn_apart(tmp_path: Path) -> None:
-    """Of first order nothing is left, wherever the search starts; a limit is kept where it asks for less."""
+    """Check that the first order vanishes at a lead of 180 deg, and that a narrower range ends at its bound."""
     text = changed(FEW, '[[engine.slider_cranks]]\nshaft = "right"\nx = "0 mm"\n', "")
     text = changed(text, 'ratio = -1\nposition = ["-150 mm", "0 mm"]\nlead = { between = [0, 360], start = 0 }',
                    'position = ["-150 mm", "0 mm"]')  # fmt: skip
@@ -85,7 +85,7 @@ def test_two_that_turn_alike_are_best_half_a_turn_apart(tmp_path: Path) -> None:
 
 
 def test_a_limit_holds_the_lead_away(tmp_path: Path) -> None:
-    """Of opposed pistons the least lead; with a roll moment limited to what another one has, that one."""
+    """Check that the lead of opposed pistons ends at its bound, and that a limit on the roll moment is kept."""
     text = (PROBLEMS / "opposed-pistons-masses.toml").read_text(encoding="utf-8")
     text = changed(text, '{ between = ["1 kg", "3 kg"] }', '"2 kg"')
     text = changed(text, "crank_lead = 12", "crank_lead = { between = [8, 20] }")

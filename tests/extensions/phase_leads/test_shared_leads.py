@@ -54,7 +54,7 @@ def pair(ahead: float, ratio: float, rods: tuple[float, float], radii: tuple[flo
 
 @pytest.mark.parametrize("seed", [*range(6), 7, 9])
 def test_torque_changes_by_no_more_than_is_told(seed: int) -> None:
-    """At every lead of a box and every angle, by the exact cycle; and by not much less."""
+    """Check that the torque at every lead of a box differs by no more than the bound, which is tight."""
     random = np.random.default_rng(seed)
     cycle = (Cycle.TWO_STROKE, Cycle.FOUR_STROKE)[seed % 2]
     ratio, rods, radii = float(random.choice([-1.0, 1.0])), random.uniform(0.1, 0.35, 2), random.uniform(0.03, 0.08, 2)
@@ -136,7 +136,7 @@ CASES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_no_lead_is_better_than_the_bound(name: str) -> None:
-    """Of a row of leads, each given; the design is what its own file has."""
+    """Check that none of nine leads is below the bound, and the design against a file with this lead."""
     own = CASES[name]
     found = laufruhe.solve(own)
     (decision,) = own.decisions

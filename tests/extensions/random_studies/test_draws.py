@@ -23,7 +23,7 @@ def rows(mark: str) -> np.ndarray:
 
 
 def trusted(folder: Path, points: dict[str, Point] = POINTS) -> list[str]:
-    """Which pieces are taken from a store; each as it was kept, or the test fails."""
+    """Return the pieces that a store accepts, after a check that each is as written."""
     with Draws(folder, COLUMNS, points) as store:
         for mark in store.seconds:
             assert store.read(mark)[VALUES].tobytes() == rows(mark).tobytes()

@@ -71,7 +71,7 @@ def finished() -> Callable[..., None]:
 
 @pytest.fixture(scope="session")
 def worth() -> Callable[..., Any]:
-    """What an expression is worth in a part of a replication, in the first reading unless told."""
+    """Return a function that evaluates an expression in a part of a replication, by default in the first reading."""
 
     def found(name: str, text: str, file: str = "tractor-study", reading: str | None = None) -> Any:
         names = parts_of(file)[name].names(computed(file, name))

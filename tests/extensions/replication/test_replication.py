@@ -189,7 +189,7 @@ def test_cases_sweep_and_keep_their_own_dimensions() -> None:
 
 
 def test_cases_may_sweep_in_any_order() -> None:
-    """One number within the other in one case, the other way round in the next."""
+    """Check that two cases that nest their sweeps the other way round give the same values."""
     cm, kappa = {"values": [6, 9]}, {"values": [0, 0.5, 1]}
     part = _part(cases=[
         {"name": "one", "problem": "web", "sweep": {"cm": cm, "kappa": kappa}},
@@ -253,7 +253,7 @@ def test_refused(more: dict[str, Any], said: str) -> None:
 
 @pytest.mark.parametrize("name", READY)
 def test_ready_replication(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    """By its command; every statement confirmed but those whose source is wrong."""
+    """Check by its command that every statement is confirmed except those whose source is wrong."""
     confirmed, wrong = READY[name]
     monkeypatch.chdir(tmp_path)
     answer = CliRunner().invoke(app, ["study", str(PROBLEMS / f"{name}.toml")])

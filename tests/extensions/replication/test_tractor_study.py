@@ -121,7 +121,7 @@ def test_a_dataset_that_was_read_again_knows_all_that_its_picture_says(figure: D
 
 @pytest.mark.parametrize("name", SIZED)
 def test_optima_are_proven(figure: Data, name: str) -> None:
-    """Every decided design stands within 1e-4 of a bound that no design can pass."""
+    """Check that every decided design is within 1e-4 of its bound."""
     data = figure(name)
     decided = data["bound"].notnull()
     assert decided.any()
@@ -141,7 +141,7 @@ class TestSingle:
         )
 
     def test_reciprocating_force_of_fig_5(self, worth: Worth) -> None:
-        """At dead centre eq. 7 has half of m r w^2 (1 + lambda); a little later the moment adds to it.
+        """Check the force of half of m r w^2 (1 + lambda) at dead centre, eq. 7.
 
         "doppelt so gross" as the 300 kp of Fig. 2: 2.25 kg make it, 1.25 kg do not.
         """
@@ -316,7 +316,7 @@ def test_free_force(worth: Worth) -> None:
 
 
 def test_no_compression_ratio_saves_the_printed_mass(worth: Worth) -> None:
-    """From 16 to 21, where the gas makes 253 to 305 kp of the 300 that are printed (Fig. 2)."""
+    """Check that no compression ratio from 16 to 21 (253 to 305 kp of gas force) fits the printed mass (Fig. 2)."""
     for name, low, high in (("cancel", 6.5, 7.5), ("rest", -58.0, -48.0), ("share", 40.0, 60.0)):
         values = worth("reciprocating-mass", f"{name}_by")
         printed, meant = values.sel(m=1.25), values.sel(m=2.25)

@@ -1,4 +1,4 @@
-"""Which measured part goes where: against all assemblies, one by one."""
+"""Places of measured parts, compared with all assemblies one by one."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_parts_of_one_mass_are_the_drawing(read: Read) -> None:
 
 
 def test_more_parts_are_never_worse(read: Read) -> None:
-    """Of the same lot's mean: a part more at either side."""
+    """Check that two more parts of the same mean mass give no worse assembly."""
     text = THREE + POINT + LEAST.format("rms rocking couple") + '[assembly]\npistons = "p.csv"\n'
     few = best(solve(read(text, [1240.0, 1250.0, 1260.0])))
     many = best(solve(read(text, [1240.0, 1250.0, 1260.0, 1245.0, 1255.0])))

@@ -99,7 +99,7 @@ def test_worst_case_is_proven(result: Result) -> None:
 
 
 def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result) -> None:
-    """By rows of all engines at once, and some of them by the exact model alone."""
+    """Check 10,064 built engines by rows, and some by the exact model, against the worst case."""
     values = turned([d.value for d in result.decisions])
     engines = BuiltEngines(problem, values, problem.fidelity.samples)
     errors = tolerances_of(problem).draw(np.random.default_rng(99), 10_000)
@@ -203,7 +203,7 @@ def limited(read: Callable[[str], Problem], maximum: float) -> tuple[Problem, _P
 
 
 def test_limits_that_are_lowered_too_far_show_no_conflict(read: Callable[[str], Problem]) -> None:
-    """That no design is left is then because of what they were lowered by."""
+    """Check that a program without a design names no conflict if margins, not limits, exclude all designs."""
     _, program = limited(read, 1900.0)
     assert program.solved(program.angles) is not None
     program.lower(0.91)
@@ -215,7 +215,7 @@ def test_limits_that_are_lowered_too_far_show_no_conflict(read: Callable[[str], 
 
 
 def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem]) -> None:
-    """Where that is more than the worst engine found, limits are lowered by it and the design is sought again."""
+    """Check that a design is sought again with lowered limits if the proven worst engine breaks one."""
     problem, program = limited(read, 1000.0)
     angles = program.angles
 

@@ -31,7 +31,7 @@ KILOPOND = 9.80665
 
 
 def test_long_words_over_neighbouring_lines_keep_apart() -> None:
-    """Of a kilopond and ten: their names are longer than the distance of the lines."""
+    """Check that long names of two neighbouring lines stand at different heights."""
     attributes = {
         "mark_names": ["worst sum, a source", "free force, a source"],
         "mark_forces": [GRAVITY, 10.0 * GRAVITY],
@@ -62,7 +62,7 @@ def test_one_unbalance_is_u_omega_squared() -> None:
 
 
 def test_pistons_alone_at_the_dead_centre() -> None:
-    """All pistons of a four are at a dead centre together: the worst sum is 2 |s''_top| + 2 |s''_bottom|."""
+    """Compare the worst sum of a four-cylinder engine with 2 |s''_top| + 2 |s''_bottom|."""
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     part = problem.engine.slider_cranks[0]
     found = sum(worst_parts(problem.engine, 1.0, tolerances_of(0.01)).values())
@@ -117,7 +117,7 @@ def test_quantiles_are_those_of_the_draws() -> None:
 
 
 def test_built_engines_stay_within_the_worst_sum() -> None:
-    """What an engine as built makes over its drawing, by the exact model, is never more than the worst sum."""
+    """Check that 20 built engines add less shaking force to their drawing than the worst sum."""
     problem = load(PROBLEMS / "vee-six-60.toml")
     engine, point = problem.engine, problem.points[0]
     tolerances = tolerances_of(0.01, 5e-4, 3, 5e-5, (30.0,))

@@ -1,4 +1,4 @@
-"""Files of the study part on tolerances: what they say, and what bad ones are text_of_study."""
+"""Files of the study part on tolerances, and lines that refuse bad files."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def random_norm(name: str, seed: int, share: float = 0.3) -> AffineNorm:
 
 
 def all_errors(angles: int) -> Array:
-    """Every corner of the intervals with angles all about the circle."""
+    """Return every corner of the three intervals with every angle of the circle, shape (cases, 5)."""
     turns = 2.0 * np.pi * np.arange(angles) / angles
     circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return np.array([[*ends, *u] for ends in itertools.product((-1.0, 1.0), repeat=3) for u in circle])

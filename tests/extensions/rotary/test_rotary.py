@@ -50,12 +50,12 @@ def _of(unit: RotaryUnit) -> Engine:
 
 
 def _area(line: ComplexArray) -> float:
-    """Of a polygon, by the shoelace formula."""
+    """Return the area of a polygon by the shoelace formula [m^2]."""
     return float(0.5 * np.sum((np.conj(line) * np.roll(line, -1)).imag))
 
 
 def _housing(turn: Array) -> ComplexArray:
-    """Where an apex is when it has turned so far about its rotor's centre (textbook eq. 7)."""
+    """Return the place of an apex when the rotor has turned about its centre (textbook eq. 7) [m]."""
     return np.asarray(E * np.exp(3j * (turn - math.pi / 3.0)) + R * np.exp(1j * turn))
 
 
@@ -119,7 +119,7 @@ class TestGas:
 
     @pytest.mark.parametrize("phi", [0.1, 1.3, 2.9, 4.4, 6.0])
     def test_the_eccentric_carries_what_presses_on_the_flanks(self, phi: float) -> None:
-        """Of a rotor with its centre of gravity on the eccentric, and what turns with it."""
+        """Compare the pin force with pressure on the flanks and inertia of a rotor on the eccentric."""
         total = MASS * E * SPEED**2 * cmath.exp(1j * phi)
         for at, pressure in self._pressures(phi):
             line = (UNIT.outlines(0.0)[1].points[:31] - E) * cmath.exp(1j * at / 3.0)

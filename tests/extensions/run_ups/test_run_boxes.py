@@ -127,7 +127,7 @@ def minimum(under: LinearBound) -> Array:
 
 @pytest.mark.parametrize("seed", first_fast(range(12), 0, 4))
 def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
-    """Of 48 in every box, corners among them: nor under the linear function; bounds of small boxes are near."""
+    """Check that none of 48 designs per box is below its linear minorant or bound, and that small boxes are tight."""
     boxes = of_seed(seed)
     found = [boxes.runs.under(measure, boxes.lower, boxes.upper) for measure in OF_RUNS]
     tight = []
@@ -386,7 +386,7 @@ def test_a_motion_of_unit_energy_has_no_larger_signal_than_its_gain() -> None:
 
 @pytest.mark.slow
 def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
-    """What no spring holds moves as far as it is pushed: nothing is said of it, and nothing false."""
+    """Check that a box that includes zero stiffness has the bound minus infinity."""
     tables = random_tables(7)
     for place in tables["mounts"]["places"]:
         place["stiffness"] = [{"between": ["0 N/mm", "300 N/mm"], "start": "100 N/mm"}, "200 N/mm", "200 N/mm"]

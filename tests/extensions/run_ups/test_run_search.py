@@ -119,7 +119,7 @@ def test_the_design_keeps_its_limits_when_scipy_integrates_it(ready: tuple[Probl
 
 @pytest.mark.slow
 def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result]) -> None:
-    """Of 400 pairs those that promise more, their run-ups followed: none keeps both limits, and near ones do."""
+    """Check that no pair of stiffnesses of a grid of 400 keeps both limits and is better than the optimum."""
     problem, result = ready
     initial = evaluate(problem, samples=180)
     grid = np.exp(np.linspace(np.log(40e3), np.log(600e3), 20))
@@ -137,7 +137,7 @@ def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result
 
 @pytest.mark.slow
 def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
-    """Of damping, place and a shaft; between coarse steps and at fine ones; with stops and without."""
+    """Check run-up peaks and their slopes for damping, place and shaft against the exact run and differences."""
     opened = {
         "damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"},
         "position": [{"between": ["100 mm", "300 mm"], "start": "200 mm"}, "200 mm", "0 mm"],
@@ -218,7 +218,7 @@ def test_runs_on_bump_stops_are_those_of_scipy() -> None:
 
 @pytest.mark.slow
 def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
-    """One number: every better one of a dense row breaks the limit, by SciPy too."""
+    """Check that every better stiffness of a row of 40 breaks the limit, and compare the peak force with SciPy."""
     given = mounts(STOP)
     given["places"][2]["stiffness"] = [
         "120 N/mm",
@@ -241,7 +241,7 @@ def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
 
 @pytest.mark.slow
 def test_weights_beside_stops_that_none_meets_are_those_of_the_cones() -> None:
-    """With stops beyond reach of the proven best, that design stays one: the search finds none much worse."""
+    """Check that stops beyond reach leave the optimum at that of the cone program."""
     shaft = tables_of(PROBLEMS / "soft-single-run-up.toml")["balancer_shafts"]
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
     settings = {"objective": {"minimise": "run-up force"}, "balancer_shafts": shaft, "counterweights": [weight]}
@@ -306,7 +306,7 @@ def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
 
 @pytest.mark.slow
 def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
-    """All at once: limits that the design as given breaks are kept by the exact model, at little force."""
+    """Check that a search with all features together keeps limits that the initial design breaks."""
     given = mounts()
     opened = {"between": ["60 N/mm", "600 N/mm"], "start": "200 N/mm"}
     given["places"][0]["stiffness"] = ["120 N/mm", "120 N/mm", opened]
@@ -339,7 +339,7 @@ def test_fidelities_of_a_run_up_have_its_loads() -> None:
 
 @pytest.mark.slow
 def test_errors_of_run_ups_are_told_and_hold_at_finer_steps() -> None:
-    """What stands between steps is no more than what is told, by those of SciPy; all orders stay for a run."""
+    """Check that SciPy's peak lies within the error estimate, and that all orders stay for a run-up."""
     settings = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
     problem = limited(("run-up force", "1 kN"), **settings)
     result = laufruhe.evaluate(problem)

@@ -39,7 +39,7 @@ def test_wrenches_of_steps_have_the_integral_of_the_load() -> None:
 
 
 def test_steps_are_a_24th_of_the_shortest_period() -> None:
-    """Of order 12 at the fastest speed; fewer where there would be more than 4000 in a sixtieth of a run."""
+    """Check 24 steps per period of order 12 at the highest speed, and fewer above 4000 steps per stretch."""
     for first, last in ((0.0, 100.0), (100.0, 0.0), (30.0, 60.0)):
         sweep = sweep_of(first, last, 6.0)
         assert sweep is not None

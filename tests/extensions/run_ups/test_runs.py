@@ -65,7 +65,7 @@ def test_steps_follow_the_highest_order_and_miss_what_a_wave_leaves(seconds: flo
 
 
 def test_a_constant_load_swings_to_twice_its_rest() -> None:
-    """Of a load from rest without damping the force is F (1 - cos w t); speeds below zero are refused."""
+    """Compare the force from rest without damping with F (1 - cos w t); check that negative speeds are refused."""
     mounting = four_mounts(2e4)
     speed, force = 90.0, 400.0
     load = Spectrum(Fraction(1), np.array([force * HEAVE / speed**2, 0.0 * HEAVE], dtype=complex))
@@ -120,7 +120,7 @@ def test_stops_push_back_as_scipy_says() -> None:
 
 
 def test_a_mode_next_to_rest_is_pushed_by_stops_as_by_integration() -> None:
-    """What no spring holds drifts until it meets its stop: a rate of nothing has the series of its shares."""
+    """Compare the motion of a nearly free mode with a stop with that of SciPy."""
     travels = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
     gaps, stops = np.array([0.002, np.inf, np.inf]), np.array([2000.0, 0.0, 0.0])
     model = stopped(travels, gaps, stops, np.diag([1e-4, 900.0]))

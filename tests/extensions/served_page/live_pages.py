@@ -83,7 +83,7 @@ def with_unknown_norm(problem: Problem) -> Problem:
 
 
 def problem_of(name: str) -> Problem:
-    """Every norm, or a ready problem."""
+    """Return the problem of every norm, or a ready problem."""
     return load(EVERY_NORM if name == "every norm" else PROBLEMS / f"{name}.toml")
 
 

@@ -1,4 +1,4 @@
-"""What a page is answered is what the commands find, and nothing is reached that it was not offered."""
+"""Answers to a page, compared with results of the commands; files beyond those offered are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the served page claims while a simpler problem stands in for the whole one, and what it claims in the end."""
+"""Claims of the served page while it solves a simpler problem, and its last claim."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_a_limit_that_moves_has_no_bound_beside_it(name: str) -> None:
     ("name", "minimum"), [("few-angles-below-any-design", 1508.9), ("few-angles-16-percent-below", 3837.4)]
 )
 def test_an_estimate_is_what_its_design_has(name: str, minimum: float) -> None:
-    """At the angles that the program takes both read less than any design has."""
+    """Check an estimate against its design at many angles, and that no design has less."""
     path = INPUTS / f"{name}.toml"
     found = follow(path)
     assert found["claim"]["kind"] == "estimate"

@@ -18,7 +18,7 @@ PATIENCE = 120.0
 
 
 def saved(path: Path, text: str) -> None:
-    """At once: whoever looks sees the old text or the new one, and no part of it."""
+    """Save a text at once, so that a reader sees the old text or the new one."""
     new = path.with_suffix(".new")
     new.write_text(text, encoding="utf-8")
     new.replace(path)

@@ -1,4 +1,4 @@
-"""Of requests that wait only the newest is worked on, and what hangs is ended."""
+"""Worker that answers only the newest of waiting requests and ends one that hangs."""
 
 from __future__ import annotations
 

@@ -84,14 +84,14 @@ def shown(page: Page, address: str) -> Page:
 
 
 def settled(page: Page) -> float:
-    """What the whole problem has, once it is solved."""
+    """Return the value of the whole problem after it is solved."""
     place = page.locator(LAST)
     place.wait_for()
     return float(place.get_attribute("data-value") or "nan")
 
 
 def slide(page: Page, control: str, value: float) -> None:
-    """As a mouse does."""
+    """Move a slider as a mouse does."""
     page.locator(f'[data-control="{control}"]').evaluate(
         "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('input', { bubbles: true })); }",
         value,

@@ -1,4 +1,4 @@
-"""Who is let in, and how much is read: asked over real connections."""
+"""Access to the server and the size of what it reads, over real connections."""
 
 from __future__ import annotations
 

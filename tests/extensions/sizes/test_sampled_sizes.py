@@ -35,7 +35,7 @@ def of_many_angles(throw: float) -> Result:
 
 
 def test_a_bound_of_sizes_is_not_over_a_rival_that_many_angles_judge() -> None:
-    """At a throw of 3 deg 48 angles have a quarter of a percent too much of the second order."""
+    """Check the bound from 48 angles, which overestimate order 2, against a design at many angles."""
     few, many = solve(problem(sized(3), objective=SECOND)), of_many_angles(3)
     rival = objective_value(many.problem, with_fine_sampling(many.final))
     assert few.certificate is not None

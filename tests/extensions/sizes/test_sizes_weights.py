@@ -58,7 +58,7 @@ def solved(problem: Problem) -> Result:
 
 
 def held(problem: Problem, sizes: np.ndarray) -> Problem:
-    """With these sizes, unbalances open."""
+    """Return the problem with these sizes and open unbalances."""
     named = tuple(d for d in problem.decisions if d not in problem.unbalances)
     engine = problem.design(sizes.tolist(), named)
     return replace(problem, engine=engine, decisions=problem.unbalances)

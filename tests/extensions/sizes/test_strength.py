@@ -225,7 +225,7 @@ def problem_limit(problem: Problem, limit: Limit) -> float:
 
 
 def test_masses_follow_the_sizes() -> None:
-    """Of plain bodies: a straight rod, rings, and webs as boxes integrated over their length."""
+    """Compare masses with plain bodies: a straight rod, rings, and webs as boxes integrated over their length."""
     plain = laufruhe.load(TEXT).engine
     heavy = laufruhe.load(TEXT.replace("[running_gear]", '[running_gear]\ndensity = "7850 kg/m^3"')).engine
     shank = 7850.0 * math.pi / 4.0 * 0.022**2 * 0.150

@@ -103,7 +103,7 @@ def test_torque_is_what_the_energy_loses() -> None:
 
 @pytest.mark.parametrize("share", [0.1, 0.37, 0.8])
 def test_orders_in_closed_form(share: float) -> None:
-    """With q = r/e, E = e^{i alpha} the lever points along i sqrt((1 - i q E) / (1 + i q / E)), two series (K17)."""
+    """Compare orders of the lever's direction, i sqrt((1 - i q E) / (1 + i q / E)), with two series (K17)."""
     part, highest, terms = yoke(share), 12, 400
     up, down = np.ones(terms, dtype=complex), np.ones(terms, dtype=complex)
     for j in range(terms - 1):

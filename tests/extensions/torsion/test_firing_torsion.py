@@ -35,7 +35,7 @@ def problem_of(whole: dict[str, Any]) -> Problem:
 
 
 def fired(whole: dict[str, Any], order: tuple[int, ...]) -> Problem:
-    """With a firing order given, and the throws that it makes even."""
+    """Return the problem with a firing order and the throws that it makes even."""
     engine = {key: value for key, value in whole["engine"].items() if key not in ("throws", "cylinders")}
     without = {key: value for key, value in whole.items() if key != "phasing"}
     return problem_of({**without, "engine": {**engine, "firing_order": list(order)}})
@@ -62,7 +62,7 @@ def every() -> dict[tuple[int, ...], float]:
 
 
 def test_every_firing_order_is_ranked(every: dict[tuple[int, ...], float]) -> None:
-    """By pairs of throws as by the exact model, the best one proven."""
+    """Compare the ranking of all 24 firing orders by pairs of throws with the exact model; the best is proven."""
     result = laufruhe.solve(problem_of(tables(phasing={"best": 24})))
     assert result.status is Status.OPTIMAL
     found = ranked(result)
@@ -245,7 +245,7 @@ def test_bearings_limit_what_twists() -> None:
 
 
 def test_banks_that_share_throws_are_decided_order_by_order() -> None:
-    """Every firing order of every even star by itself, proven by all of them."""
+    """Check that banks with shared throws prove each firing order of each even star by itself."""
     vee = tables_of(PROBLEMS / "vee-eight-open.toml") | {"torsion": tables()["torsion"], **STEPS}
     vee |= {"objective": {"minimise": "rms shaft stress"}}
     vee = {key: value for key, value in vee.items() if key not in ("counterweights", "balancer_shafts", "constraints")}

@@ -109,7 +109,7 @@ def test_the_critical_speed_of_a_two_disc_crank_with_a_pendulum() -> None:
 
 
 def test_no_flywheel_of_the_bounds_leaves_the_forbidden_band() -> None:
-    """Every design has 5489 to 5593 rpm."""
+    """Check that a band around the critical speeds of all designs, 5489 to 5593 rpm, is named as a conflict."""
     result = laufruhe.solve(INPUTS / "pendulum-open.toml")
     assert result.status == "infeasible"
     assert result.conflict == ("critical speeds of order 4",)
@@ -118,7 +118,7 @@ def test_no_flywheel_of_the_bounds_leaves_the_forbidden_band() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [3.0, 5.0, 4.5])
 def test_boxes_exclude_no_pendulum_that_keeps_its_limit(order: float) -> None:
-    """With its inertia and the flywheel open, below, above and in its own order."""
+    """Check boxes of open pendulum and flywheel against random designs below, above and in the pendulum's order."""
     text = (INPUTS / "pendulum-open.toml").read_text()
     text = text.replace('inertia = "0.0080277 kg m^2"', 'inertia = { between = ["0.004 kg m^2", "0.02 kg m^2"] }')
     problem = laufruhe.load(text.replace("orders = [4]", f"orders = [{order:g}]"))
@@ -143,7 +143,7 @@ def test_boxes_exclude_no_pendulum_that_keeps_its_limit(order: float) -> None:
 
 
 def test_ends_of_a_box_hold_the_critical_speeds_of_all_pendulums_in_it() -> None:
-    """Counted from the highest; none are told where an inertia in the order goes through zero in the box."""
+    """Check that the ends enclose the critical speeds of random designs, counted from the highest."""
     text = (INPUTS / "pendulum-open.toml").read_text()
     text = text.replace('inertia = "0.0080277 kg m^2"', 'inertia = { between = ["0.004 kg m^2", "0.06 kg m^2"] }')
     resonance, rng, counts = InOrder(5.0), np.random.default_rng(3), {True: 0, False: 0}

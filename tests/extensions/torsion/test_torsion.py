@@ -181,7 +181,7 @@ def test_every_disc_obeys_its_torques(five: tuple[Engine, OperatingPoint]) -> No
 
 
 def test_the_load_takes_the_mean(five: tuple[Engine, OperatingPoint]) -> None:
-    """From throw to throw one cylinder's mean more; nothing goes forward, and behind the load nothing at all."""
+    """Check the mean torque per shaft against the sum of the throws before it, for a load behind and at throw 2."""
     engine, point = five
     each = throw_torques(engine, point).coefficients[0].real
     mean = shaft_torque(engine, point).coefficients[0].real

@@ -109,7 +109,7 @@ def test_more_discs_than_a_shaft_has() -> None:
 
 
 def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
-    """Where it is told twice both agree, the ring of an absorber counted or not; else one line says what differs."""
+    """Check the inertia of the discs by hand, and that another inertia in the file must agree."""
     tables = tables_of(READY)
     tables["constraints"] = [{"limit": "degree of irregularity", "max": "0.05"}]
     engine = load_tables(tables, Path("five.toml")).engine

@@ -1,4 +1,4 @@
-"""What tables, files and pictures say of the crankshaft's twist is what the physics gives."""
+"""Tables, files and pictures of the crankshaft's twist, compared with the physics."""
 
 from __future__ import annotations
 
