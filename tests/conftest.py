@@ -73,7 +73,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection() -> None:
-    """What is imported and collected lives to the end; looking through it again and again costs seconds."""
+    """Stop the garbage collector, because imported and collected objects live to the end of the run."""
     gc.disable()
 
 

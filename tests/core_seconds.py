@@ -1,7 +1,7 @@
-"""What every test takes of one core, and which lane that puts it into.
+"""Core seconds of every test, and the lane in which it runs.
 
-`slow.txt` lists what took more than a fifth of a second and bears no mark `slow` of its own; `make lanes` writes
-it anew. Nothing fails by a time: a run names what it saw over that in the fast lane.
+`slow.txt` lists tests without a mark `slow` of their own that took more than a fifth of a second; `make lanes` writes
+it anew. No test fails because of its time: a run lists the slow tests that it saw in the fast lane.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def listed_now() -> list[str]:
 
 
 def _spent() -> float:
-    """Of this process, and of those that it started and that have ended."""
+    """Return the time of this process and of its finished children [s]."""
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return process_time() + children.ru_utime + children.ru_stime
 

@@ -1,4 +1,4 @@
-"""What can be wrong with a picture, whatever it shows: cut, covered, small, pale or crooked words, and odd ticks."""
+"""Faults that any picture can have: words that are cut, covered, small, pale or crooked, and odd ticks."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from shared import once
 
 @cache
 def solved(name: str) -> Result:
-    """What `solve` says of a ready problem as it stands."""
+    """Return the result of a ready problem."""
 
     def fill(folder: Path) -> None:
         (folder / "result").write_bytes(cloudpickle.dumps(solve(load(PROBLEMS / f"{name}.toml"))))

@@ -45,7 +45,7 @@ Digits = NDArray[np.object_]
 
 @dataclass(frozen=True)
 class RigidPart:
-    """How far double precision is from 50 digits.
+    """Error of double precision against 50 digits.
 
     Attributes
     ----------

@@ -73,14 +73,14 @@ def _short(name: str) -> str:
 
 
 def _words(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str) -> str:
-    """What is told of this key alone, what its table says of itself, or what is told of the key wherever it stands."""
+    """Return the words of this key, else of its table, else of the key in any table."""
     words, of_table = _texts()["words"], _of_table(schema, entry)
     own = "" if of_table == ANYWHERE else of_table
     return str(words.get(path) or own or words.get(path.rpartition(".")[2], ""))
 
 
 def kind(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
-    """What a value is, in words: its dimension, choices, or what a list holds."""
+    """Return the kind of a value in words: its dimension, choices, or the members of a list."""
     words: list[str] = []
     for one in alternatives(schema, entry):
         if "between" in one.get("properties", {}):
@@ -122,7 +122,7 @@ def _written(schema: Mapping[str, Any], entry: Mapping[str, Any], value: Any) ->
 
 
 def _of_table(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
-    """What the table of a key says of itself."""
+    """Return the description of the table of a key."""
     for one in alternatives(schema, entry):
         inner = one.get("items") if one.get("type") == "array" else one
         for table in alternatives(schema, inner) if isinstance(inner, dict) else ():

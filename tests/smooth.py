@@ -1,4 +1,4 @@
-"""Smooth forms of norms, taken as functions of what they are made of."""
+"""Programs that evaluate smooth forms of norms."""
 
 from __future__ import annotations
 
@@ -11,49 +11,49 @@ from laufruhe.problem.measure import Measure
 
 
 class AtItsValues:
-    """A program whose variables are the values that they start from; what it holds is kept."""
+    """Program whose variables are their start values; it keeps the expressions that it holds."""
 
     def __init__(self) -> None:
         self.held: list[Any] = []
         self.has_free = False
 
     def head(self, value: Any) -> Any:
-        """The value itself."""
+        """Return one more variable."""
         return value
 
     def free(self, value: Any) -> Any:
-        """The value itself, from which a solver goes on to a better one."""
+        """Return as many variables as the value has numbers."""
         self.has_free = True
         return value
 
     def hold(self, expression: Any) -> None:
-        """Nothing but kept."""
+        """Keep an expression."""
         self.held.append(expression)
 
 
 class WithVariables:
-    """A program whose variables are symbols of their own."""
+    """Program whose variables are symbols of their own."""
 
     def __init__(self) -> None:
         self.held: list[Any] = []
         self.variables: list[Any] = []
 
     def head(self, value: Any) -> Any:
-        """One more variable."""
+        """Return one more variable."""
         return self.free(value)
 
     def free(self, value: Any) -> Any:
-        """As many as the value has numbers."""
+        """Return as many variables as the value has numbers."""
         self.variables.append(ca.SX.sym(f"v{len(self.variables)}", *value.shape))
         return self.variables[-1]
 
     def hold(self, expression: Any) -> None:
-        """Nothing but kept."""
+        """Keep an expression."""
         self.held.append(ca.reshape(expression, -1, 1))
 
 
 def smooth_value(model: UnevenModel, measure: Measure, share: float) -> Any:
-    """What a program would minimise of a measure, softened by this much of one."""
+    """Return the value of a measure in a smooth program, softened by a share of one."""
     rows, grid = model.rows(measure)
     program = AtItsValues()
     value = measure.norm.smooth_expression(program, grid, rows, 1.0, share)

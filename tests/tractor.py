@@ -69,7 +69,7 @@ def problem(
     tolerance: float = 1e-4,
     upper: float = 0.3,
 ) -> Problem:
-    """One operating point, the named rotors free."""
+    """Return a problem with one operating point and the named rotors free."""
     return Problem(
         "test",
         "test",

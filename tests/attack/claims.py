@@ -1,4 +1,4 @@
-"""What a result claims, held against the plain model and the best rival."""
+"""Claims of a result, compared with the plain model and with the best rival."""
 
 from __future__ import annotations
 

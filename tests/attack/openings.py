@@ -1,4 +1,4 @@
-"""What a problem file leaves open, as a vector that a search may move; and the design of a result, read back.
+"""Open numbers of a problem file as a vector for a search, and the design of a result as such a vector.
 
 A vector has one entry for every open number of engine, places and mounts, and one or two for every open
 unbalance: its size where the angle is given, its two components otherwise. All entries are shares of their bounds.

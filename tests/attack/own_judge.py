@@ -1,7 +1,7 @@
-"""What a result claims, held against the own model and against the best design that it finds.
+"""Claims of a result, compared with an independent model and with the best design that it finds.
 
-The own model reads the problem file and values of decisions. Where its value is exact (means, root mean squares, all
-that is at rest) it agrees with the package's to 1e-9; a bound may not be over any design that it finds by more.
+The independent model reads the problem file and values of decisions. Where its value is exact (means, root mean
+squares, numbers at rest) it agrees with the package's to 1e-9. A bound may exceed a design by no more.
 """
 
 from __future__ import annotations

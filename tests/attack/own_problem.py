@@ -1,6 +1,6 @@
-"""What a problem file on elastic mounts asks of many designs at once, by loads and mounts of our own.
+"""Measures and limits of a problem file on elastic mounts for many designs at once, by independent loads and mounts.
 
-It reads the file and values of decisions, and shares no code with the package.
+The module reads the file and values of decisions, and shares no code with the package.
 """
 
 from __future__ import annotations

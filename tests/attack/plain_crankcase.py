@@ -1,8 +1,8 @@
-"""What happens inside the crankcase of an in-line engine, from positions and the law of the lever alone.
+"""Loads inside the crankcase of an in-line engine, from positions and the law of the lever alone.
 
-A rod without a moment of its own pushes along itself, one with a shank so that it turns as it does; bearings beside a
-load share it as supports of a beam on two of them do; torque is work per angle; speed follows from energy; discs on
-shafts answer order by order.
+A massless rod pushes along itself. A rod with a shank has the inertia of its turn as well. Two bearings carry a load
+between them as supports of a beam. Torque is work per angle, speed follows from energy, and discs on shafts answer
+order by order.
 """
 
 from __future__ import annotations

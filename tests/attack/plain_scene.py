@@ -1,4 +1,4 @@
-"""What a problem file asks of one design, every number closed: measures, objective, how far limits are broken.
+"""Measures, objective and violations of a problem file for one design, with every number closed.
 
 Loads of one design are a transform per operating point; a measure picks a channel and a norm of it.
 """

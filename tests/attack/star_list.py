@@ -1,4 +1,4 @@
-"""Every even star of a problem with open throws, by trying all ways to stand on the steps of even firing."""
+"""List of the even stars of a problem with open throws, by all ways to stand on the steps of even firing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is claimed where two kinds of numbers are open together, and whether the judges hear a lie about it."""
+"""Claims about two kinds of open numbers together, and lies about them that the judges must find."""
 
 from __future__ import annotations
 

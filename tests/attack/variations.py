@@ -1,6 +1,6 @@
-"""One problem beside another that must be worth as much, or no more: prices, monotony, invariance.
+"""Pairs of problems of which one must have an equal or no better optimum: prices, monotony, invariance.
 
-Each takes a table and gives complaints. Where a result claims no optimum, what does not hold is a note.
+Each takes a table and gives complaints. If a result claims no optimum, a difference is a note.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What time and memory grow with: one design evaluated, unbalances decided, stars searched, stiffness decided.
+"""Growth of time and memory: one design evaluated, unbalances decided, stars searched, stiffness decided.
 
 Writes results/benchmarks/growth.md. Each size runs in a forked process of its own, whose largest memory is read;
 exponents are fitted to the larger half of the sizes. `--quick` takes the smaller half.

@@ -1,4 +1,4 @@
-"""From an input event of the served page to the frame that shows the new optimum, drawn by headless Chromium.
+"""Delay from an input event of the served page to the frame with the new optimum, drawn by headless Chromium.
 
 Writes results/benchmarks/served-page.md.
 """

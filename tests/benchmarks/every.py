@@ -1,8 +1,8 @@
-"""All benchmark scripts one after the other, each with a limit of time: `make benchmarks`.
+"""Run of all benchmark scripts one after the other, each with a limit of time: `make benchmarks`.
 
 `python tests/benchmarks/every.py growth torsion` runs these alone, `--without trade` all but some. A script that needs
 what this machine lacks, as a browser, ends with a reason and leaves its page as it was; one that fails or takes too
-long is named at the end, with the last of what it said.
+long is named at the end, with the last of its output.
 """
 
 from __future__ import annotations

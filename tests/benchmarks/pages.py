@@ -1,4 +1,4 @@
-"""What benchmark scripts share: the time of one call, where pages go, and how busy the machine was."""
+"""Shared parts of benchmark scripts: the time of one call, the folder of pages, and the load of the machine."""
 
 from __future__ import annotations
 

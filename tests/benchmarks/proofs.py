@@ -1,6 +1,6 @@
-"""Every ready problem: value, bound, gap and kind of its proof, and the processor time of its solution.
+"""Proofs of all ready problems: value, bound, gap, kind, and the processor time of the solution.
 
-Writes results/proofs/README.md, beside what an earlier version answered (results/proofs/<version>.csv);
+Writes results/proofs/README.md, beside the answers of an earlier version (results/proofs/<version>.csv);
 `--keep VERSION` writes such a table of the package that is imported. `--only NAME` takes some alone.
 """
 

@@ -1,6 +1,6 @@
-"""What users wait for, timed by pytest-benchmark: `make speed`; `SPEED=--benchmark-compare` adds the last run.
+"""Times that users wait, by pytest-benchmark: `make speed`; `SPEED=--benchmark-compare` adds the last run.
 
-Nothing here is collected with the tests: how long something takes belongs to a machine.
+Pytest collects no benchmark with the tests, because times depend on the machine.
 """
 
 from __future__ import annotations

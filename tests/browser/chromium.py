@@ -57,7 +57,7 @@ def launched() -> Iterator[Browser]:
 
 
 def foreign(address: str) -> bool:
-    """Whether an address is neither of the page itself nor of this machine."""
+    """Return whether an address is neither of the page itself nor of this machine."""
     parts = urlsplit(address)
     return parts.scheme not in INNER and parts.hostname != LOOPBACK
 
@@ -85,12 +85,12 @@ def watched(browser: Browser, **options: object) -> Iterator[Watched]:
 
 
 def drawn(page: Page) -> None:
-    """All that was asked for is on the screen: a frame after the next has begun."""
+    """Wait until the page is drawn: for the frame after the next."""
     page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def violations(page: Page) -> list[dict[str, object]]:
-    """What axe finds wrong on the page as it is shown now."""
+    """Return the violations that axe finds on the page."""
     if not page.evaluate("() => 'axe' in window"):
         page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
     # of what is well one example will do

@@ -37,8 +37,10 @@ def reached(opened: Watched) -> Iterator[Watched]:
 
 @pytest.fixture
 def still(reached: Watched) -> Iterator[Page]:
-    """What the last test left open; fails its test if it asks for anything but files and 127.0.0.1, or raises an error
-    of its own."""
+    """Yield the page that the last test left open.
+
+    The test fails if the page requests anything but files and 127.0.0.1, or raises an error.
+    """
     yield reached.page
     assert reached.refused == []
     assert reached.errors == []

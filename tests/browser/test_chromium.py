@@ -1,4 +1,4 @@
-"""What other tests of pages rest on: nothing leaves the machine, and what is wrong is found."""
+"""Base of the tests of pages: no request leaves the machine, and errors of a page are found."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def test_numbers_are_those_of_the_exact_model(page: Page, tmp_path, name):
 
 @pytest.fixture(scope="module")
 def every(browser: Browser, tmp_path_factory):
-    """One page for all: what tests do to it does not outlast a new model."""
+    """Yield one page for all tests; a new model removes what a test changed."""
     with chromium.watched(browser) as seen:
         seen.page.goto(page_of(problem_of("every norm"), tmp_path_factory.mktemp("live")).as_uri())
         seen.page.locator("[data-decision]").first.wait_for()

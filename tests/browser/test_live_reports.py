@@ -46,7 +46,7 @@ SLIDE = """async values => {
 
 
 def printed(problem: Problem, found: Evaluation, names: Collection[str]) -> dict[str, list[str]]:
-    """What a report shows of these limits of a design."""
+    """Return the value and state of these limits of a design as a report shows them."""
     stands = {limit: found.check_limit(limit) for limit in problem.limits if limit.name in names}
     return {
         limit.name: [figure(stand.value, limit.measure.unit), str(stand.violation <= FEASIBILITY_TOL).lower()]
@@ -109,7 +109,7 @@ def test_the_report_opens_at_the_optimum(solved: Page) -> None:
 
 
 def test_keys_alone_are_enough(solved: Page) -> None:
-    """From the first key on: to a slider, along it, back, to a button and into a field."""
+    """Check that the keyboard alone reaches and moves a slider, a button and a field."""
     best = objective_shown(solved)
 
     def to(selector: str) -> None:
@@ -184,7 +184,7 @@ def test_a_broken_link_shows_a_design_within_the_bounds(wrong: str, page: Page) 
 
 
 def test_the_saved_file_is_evaluated_alike(solved: Page, tmp_path: Path) -> None:
-    """As a user does: slide, press, evaluate the file that was downloaded."""
+    """Check that the downloaded file of a moved slider evaluates to the values of the page."""
     slider = solved.locator('[data-decision="front web.mass"]')
     slider.focus()
     for _ in range(6):

@@ -45,7 +45,7 @@ def names_of(node: ast.expr) -> set[str]:
 
 
 def is_value(node: ast.expr) -> bool:
-    """Whether an expression is what is known of a design, as it stands or a share of it."""
+    """Return whether an expression is a known value of a design, or a share of it."""
     if isinstance(node, ast.Call) and node.args:
         return is_value(node.args[-1])
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
@@ -69,7 +69,7 @@ def clips(text: str) -> Iterator[str]:
 
 
 def is_bound(node: ast.expr) -> bool:
-    """Whether an expression has the name of a bound in it."""
+    """Return whether an expression has the name of a bound in it."""
     return any(part in name for name in names_of(node) for part in BOUNDS)
 
 

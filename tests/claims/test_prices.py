@@ -128,7 +128,7 @@ def random_problem(rng: np.random.Generator) -> dict[str, Any]:
 
 @pytest.mark.parametrize("seed", first_fast([134, 140, 145, 130, *range(12)], 0, 7))
 def test_prices_are_the_slopes_of_problems_solved_again(seed: int) -> None:
-    """Every bound and limit that holds an optimum, moved by a little both ways."""
+    """Compare prices with optima for every active bound and limit moved a little both ways."""
     _moved_both_ways(random_problem(np.random.default_rng(seed)))
 
 

@@ -82,7 +82,7 @@ def test_no_bound_lies_over_a_design(seed: int, norm: str, tmp_path: Path) -> No
 
 
 def test_a_smooth_trace_keeps_its_steps(tmp_path: Path) -> None:
-    """What 1440 steps tell to the tolerance is solved once."""
+    """Check that a trace that 1440 steps resolve to the tolerance is solved once."""
     angle = np.arange(720) * math.pi / 180.0
     pressure = 1.0 + 40.0 * np.exp(-0.5 * ((angle - 6.6) / 0.5) ** 2)
     result = laufruhe.solve(scene(pressure, "mean", tmp_path))

@@ -60,7 +60,7 @@ def told_as_optimum(result: Result) -> Result:
 
 
 def is_withheld(result: Result, best: float) -> bool:
-    """Whether a result claims nothing, says why, and has a design that is real, within its limits and not too good."""
+    """Return whether a result claims nothing, after checks of its reason and its design."""
     problem, own, objective = result.problem, result.final, result.objective
     assert objective is not None
     assert result.certificate is not None
@@ -213,7 +213,7 @@ def at(problem: Problem, values: dict[str, float]) -> float:
 
 
 def claims_no_more_than(result: Result, value: float) -> bool:
-    """Whether no bound is over a design that exists."""
+    """Return whether the bound of a result is not above a known value."""
     assert result.certificate is not None
     return result.certificate.lower_bound <= value * (1.0 + 1e-9)
 

@@ -30,7 +30,7 @@ def started(folder: Path) -> subprocess.Popen[str]:
 
 
 def results(folder: Path) -> dict[str, bytes]:
-    """Every file of the results, without what is a matter of time; none where there are none."""
+    """Return every file of the results without its times; empty if there are none."""
     found = {path.name: path.read_bytes() for path in (folder / "out").glob("*")}
     if "result.json" in found:
         record = json.loads(found["result.json"])
@@ -45,7 +45,7 @@ def left_behind(folder: Path) -> list[str]:
 
 
 def uninterrupted(folder: Path) -> Whole:
-    """One run in a new folder, left alone."""
+    """Return the results of one run in a new folder."""
     folder.mkdir()
     written(folder, scenes.SHAKING_ONLY)
     began = time.monotonic()
@@ -59,7 +59,7 @@ def uninterrupted(folder: Path) -> Whole:
 
 
 def attacked(folder: Path, seed: int, whole: Whole, log: Log) -> None:
-    """One problem in a new folder: solved and killed up to three times, then left alone."""
+    """Solve one problem in a new folder: kill up to three runs, then let one end, and log what is wrong."""
     rng = random.Random(seed)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()

@@ -1,4 +1,4 @@
-"""What check calls ok, solve does not refuse: both ask the same."""
+"""Agreement of check and solve: solve refuses no file that check accepts."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def test_who_listens_ends_by_itself_and_who_does_not_is_ended(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None)])
 def test_a_signal_to_the_whole_group_is_an_interrupt(number: signal.Signals, tmp_path: Path) -> None:
-    """As a terminal that is closed, a time limit or a batch system sends it: both processes hear it."""
+    """Check that a signal to both processes, as from a closed terminal, is an interrupt."""
     running = started(tmp_path, "import os; os.setpgid(0, 0)\n" + ASLEEP)
     os.killpg(running.pid, number)
     out, err = running.communicate(timeout=LONG)

@@ -1,4 +1,4 @@
-"""What users expect of any command line: help, quiet and verbose, standard input, completion, progress."""
+"""Conventions of a command line: help, quiet and verbose, standard input, completion, progress."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_names_of_files_cannot_command_a_screen(here: Path) -> None:
 def test_a_file_that_may_not_be_read_is_told_as_any_other_fault(
     here: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
-    """By the reader, in its one line, and not as a wrong word of the command line."""
+    """Check that the reader refuses a file without permission in its one line."""
 
     whole = Path.open
 

@@ -23,7 +23,7 @@ SOURCE = ROOT / "src" / "laufruhe"
 
 
 def first_cells(head: str) -> list[str]:
-    """Of the rows under a head of the page."""
+    """Return the first cells of the rows under a heading of the page."""
     rows = PAGE[PAGE.index(head) :].split("\n\n")[0].splitlines()[2:]
     return [row.split("|")[1].strip() for row in rows]
 

@@ -1,4 +1,4 @@
-"""Every page of the site is in its index, and every picture of the gallery is of a problem that the tests solve."""
+"""Pages of the site, all in its index, and pictures of the gallery, all of problems that tests solve."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ PLACE = re.compile(r"`((?:src|tests|problems|docs|results)/[^`\s]+)`")
 
 
 def missing(place: str) -> bool:
-    """Whether a file is not there, or holds no test of this name."""
+    """Return whether a file does not exist or holds no test of this name."""
     path, _, name = place.partition("::")
     if not (ROOT / path).exists():
         return True

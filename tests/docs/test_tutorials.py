@@ -1,4 +1,4 @@
-"""Every command of tutorials, how-to and reference pages runs, and says what the page says."""
+"""Commands of tutorials, how-to and reference pages, whose answers must be those of the page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def blocks(page: Path, kind: str) -> list[str]:
 
 
 def commands(text: str) -> list[tuple[list[str], list[str]]]:
-    """What is typed, and the lines that are shown of the answer."""
+    """Return the typed words of each command with the lines that the page shows of its answer."""
     found: list[tuple[list[str], list[str]]] = []
     for line in text.splitlines():
         if line.startswith("$ laufruhe "):

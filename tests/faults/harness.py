@@ -46,7 +46,7 @@ TRACE = "angle,pressure\n" + "".join(f"{a},{1 + 40 * max(0.0, 1 - abs(a) / 180)}
 
 @dataclass(frozen=True)
 class Found:
-    """What a command did with one damaged file."""
+    """Outcome of a command with one damaged file."""
 
     seed: int
     kind: str
@@ -97,14 +97,14 @@ def _deep_tables() -> Iterator[None]:
 
 
 def prepared(folder: Path) -> None:
-    """What stands beside a damaged file: the ready problems, that studies name, and a problem with a trace."""
+    """Write the files beside a damaged file: ready problems that studies name, and a problem with a trace."""
     for path in PROBLEMS.glob("*.toml"):
         shutil.copy(path, folder)
     (folder / "traced.toml").write_text(TRACED, encoding="utf-8")
 
 
 def tried(seed: int, verb: str, folder: Path) -> Found:
-    """One damaged file through one command."""
+    """Run one command with one damaged file, and return its outcome."""
     kind, content = damaged(seed)
     path = folder / ("trace.csv" if kind == "trace" else "damaged.toml")
     path.write_bytes(content)
@@ -152,7 +152,7 @@ def _alarm() -> Iterator[None]:
 
 
 def _said_wrong(status: int, out: str, err: str, folder: Path) -> tuple[str, str]:
-    """What is wrong with what a command said, and where."""
+    """Return the kind of fault in the output of a command, and its text; both empty without a fault."""
     lines = err.splitlines()
     if status not in _STATUSES:
         return "status", str(status)
@@ -188,7 +188,10 @@ def _serve(seeds: Sequence[int], verb: str, folder: Path, log: Path) -> None:
 
 
 def run(seeds: Sequence[int], verb: str, folder: Path, jobs: int) -> list[Found]:
-    """All seeds through one command; a process that dies or hears no alarm is a finding of the seed it was at."""
+    """Run one command with the files of all seeds, and return the outcomes.
+
+    A process that ends or hangs counts as an outcome of its current seed.
+    """
     # forked: a worker starts with all that is imported, built and read
     fork = multiprocessing.get_context("fork")
     sources()

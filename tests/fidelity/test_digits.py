@@ -30,7 +30,7 @@ def test_double_precision_on_ready_engines(name: str) -> None:
 
 @pytest.mark.parametrize("part", ["reciprocating_mass", "rotating_mass", "rod_inertia_deficit", "offset"])
 def test_a_wrong_number_shows(part: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One part of the engine off by 1e-6 in 50 digits only."""
+    """Check that an error of 1e-6 in one part shows in the comparison with 50 digits."""
     problem = random_problem(random.Random(53), gas=False)
     parts = tuple(
         replace(p, rotating_mass=0.5, rod_inertia_deficit=0.004, offset=0.002) for p in problem.engine.slider_cranks

@@ -1,4 +1,4 @@
-"""What samples miss of a limited value is told beside it, and is not exceeded."""
+"""Error estimates of limited values from samples, which the true error must not exceed."""
 
 from __future__ import annotations
 

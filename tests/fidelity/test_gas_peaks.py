@@ -60,7 +60,7 @@ minimise = "maximum mount force"
 
 
 def _signal(problem: Problem, measure: Measure, k: int, count: int) -> np.ndarray[Any, Any]:
-    """What is measured at an operating point, from the exact torque at many angles and beside all jumps of pressure."""
+    """Return the measured signal at an operating point, at many angles and on both sides of every pressure jump."""
     engine, point = problem.engine, problem.points[k]
     whole = engine.cycle.angle
     bends = [_bends(point.gas, part, whole) + part.firing_angle for part in engine.slider_cranks]

@@ -1,4 +1,4 @@
-"""What must not matter: names, front or back, direction of time, and the units of mass, length and time (C1-C8)."""
+"""Invariance to names, front or back, direction of time, and the units of mass, length and time (C1-C8)."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def _scene(rng: random.Random) -> Problem:
 
 @pytest.mark.parametrize(("first", "count"), first_fast(BLOCKS, 1, 2))
 def test_bound_is_not_below_the_regret(first: int, count: int) -> None:
-    """Of cheap optima by the exact model, against the exact optimum of the same engine."""
+    """Compare the regret bound of optima at cheap fidelities with the exact optimum of the same engine."""
     stated = []
     for seed in range(first, first + count):
         rng = random.Random(60_000 + seed)
@@ -83,7 +83,7 @@ def test_bound_is_not_below_the_regret(first: int, count: int) -> None:
 
 @pytest.mark.parametrize("path", first_fast(READY, 8, 30), ids=lambda path: path.stem)
 def test_omitted_loads_are_the_same_for_all_designs(path: Path) -> None:
-    """Where the table of dependences says so, two random designs lack the same signal."""
+    """Check that two random designs omit the same signal if the table of dependences says so."""
     problem = replace(laufruhe.load(path).balance, phasing=None)
     terms = [term.measure for term in problem.objective if term.measure.is_load]
     own, whole = problem.at(Fidelity(samples=96, orders=2)), problem.at(Fidelity(samples=96))

@@ -85,7 +85,7 @@ def test_cross_plane_engines_of_three_makers_have_one_crank(tmp_path: Path) -> N
     ],
 )
 def test_numbers_banks_and_firings_are_those_that_makers_print(key: str, printed: str, tmp_path: Path) -> None:
-    """Every cylinder has the bank of its printed number, and fires as far after cylinder 1 (makers_engines.toml)."""
+    """Compare banks and firing angles of all cylinders with the makers' data (makers_engines.toml)."""
     engine = PRINTED[printed]
     parts, order = _problem(tmp_path, key).engine.cylinders, engine["order"]
     intervals = engine.get("intervals", [720.0 / len(order)] * len(order))

@@ -115,7 +115,7 @@ def test_leads_and_rims_take_values_by_the_names_that_results_show(name: str) ->
 
 
 def test_throws_take_values_by_the_names_that_results_show() -> None:
-    """One between bounds starts there; those that are open together are all given, and are decided no more."""
+    """Check that values of all open throws close them, and that one throw between bounds starts at its value."""
     tables = tomllib.loads((PROBLEMS / "twin-vee-open.toml").read_text(encoding="utf-8"))
     problem = laufruhe.load(tables)
     result = laufruhe.solve(problem)

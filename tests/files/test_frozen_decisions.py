@@ -1,4 +1,4 @@
-"""What is open and would not be decided, and orders that no load has, are refused by name: nothing is frozen."""
+"""Open numbers that no part would decide, and orders without a load, which are refused by name."""
 
 from __future__ import annotations
 

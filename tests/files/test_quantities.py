@@ -36,7 +36,7 @@ def test_stroke_and_bore_follow_at_the_displacement(ratio: float) -> None:
 
 @pytest.mark.slow
 def test_an_open_ratio_is_decided_as_the_best_of_those_that_are_given() -> None:
-    """At one piston speed inertia falls with the stroke: the optimum lies at a bound or inside, as a scan says."""
+    """Compare the decided stroke over bore with a scan of 15 given values."""
     open_ratio = tables({"between": [0.8, 1.5], "start": 1.2})
     open_ratio["constraints"] = []
     result = laufruhe.solve(open_ratio)

@@ -74,7 +74,7 @@ def test_what_is_changed_below_is_right_as_it_stands(tmp_path: Path) -> None:
 
 
 def bad(name: str, old: str, new: str, said: str) -> ParameterSet:
-    """One change to a right file, and how the line about it begins: key, value, rule, remedy."""
+    """Return a parameter: one change to a right file, and the start of its error line."""
     return pytest.param(old, new, said, id=name)
 
 
@@ -394,7 +394,7 @@ class TestFiles:
 
 
 class TestOnEvaluation:
-    """What only the physics can find."""
+    """Errors that only the physics can find."""
 
     @pytest.mark.parametrize(
         ("stiffness", "direction"),
@@ -422,7 +422,7 @@ class TestOnEvaluation:
 
 
 class TestOperatingPoints:
-    """What the gas does at one of them."""
+    """Gas of an operating point."""
 
     def test_what_cannot_be_reached_says_where(self, tmp_path: Path) -> None:
         text = changed(
@@ -483,7 +483,7 @@ class TestTrace:
         assert complaint_about(path).startswith(f'gas.{key} = "parsec/s": ')
 
     def test_part_of_the_cycle(self, tmp_path: Path) -> None:
-        """One turn of a four-stroke's two is not enough."""
+        """Check that one turn of a four-stroke trace is refused."""
         assert complaint_about(trace(tmp_path, rows(360), "four-stroke")).startswith(
             'gas.file = "pressure.csv": the trace runs from 0 to 355 deg, so 365 of the 720 deg of a four-stroke '
             "cycle are missing; give the whole cycle"

@@ -99,7 +99,7 @@ def _drop(*keys: str | int) -> Any:
     ],
 )
 def test_damaged_problems_do_not(change: Any, validator: jsonschema.Draft7Validator) -> None:
-    """One thing wrong is enough, for the editor and for the reader."""
+    """Check that the schema refuses a problem with one fault."""
     tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
     damaged = copy.deepcopy(tables)
     change(damaged)

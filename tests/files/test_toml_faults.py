@@ -1,4 +1,4 @@
-"""What is told of a file that is no TOML: one line with line and column, what is wrong, and the remedy."""
+"""Message for a file that is no TOML: one line with line and column, the fault and the remedy."""
 
 from __future__ import annotations
 

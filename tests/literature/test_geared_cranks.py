@@ -94,7 +94,7 @@ def test_refusals(old: str, new: str, said: str, tmp_path: Path) -> None:
 
 
 def test_each_shaft_has_its_own_weights(tmp_path: Path) -> None:
-    """One factor for every shaft is two of one size; a single weight stands opposite the throw of its shaft."""
+    """Compare one factor for every shaft with a weight for each, by factor and by unbalance."""
     each = "".join(
         f'[[counterweights]]\nname = "{name}"\nshaft = "{name}"\nbalance_factor = 0.5\nradius = "50 mm"\n'
         for name in ("left", "right")
@@ -198,7 +198,7 @@ class TestOpposedPistons:
         assert [sizes["lower.mass"], sizes["upper.mass"]] == pytest.approx([expected] * 2, rel=1e-5)
 
     def test_the_second_mass_is_the_cosine_of_the_lead_times_the_first(self, tmp_path: Path) -> None:
-        """Of first order; of all orders the mean of cos(h lead), as the squares of the orders weigh it."""
+        """Compare the second mass with cos(lead) in order 1, and with the mean of cos(h lead) over all orders."""
         text = (PROBLEMS / "opposed-pistons-masses.toml").read_text(encoding="utf-8")
         path = mm.piston(mm.crank_pin(O_RADIUS), O_ROD, 0.0)
         squares = np.abs(np.fft.fft(mm.differentiated(path))[: mm.STEPS // 2]) ** 2
@@ -248,7 +248,7 @@ class TestOpposedPistons:
         assert "\n" not in str(caught.value)
 
     def test_a_list_of_parts_shares_its_chamber_too(self, tmp_path: Path) -> None:
-        """What faces each other works in one chamber, however it is described."""
+        """Compare an opposed-piston engine with the same engine as a list of parts."""
         head, tail = OPPOSED[: OPPOSED.index("throws =")], OPPOSED[OPPOSED.index("[[operating_points]]") :]
         parts = (
             '[[engine.shafts]]\nname = "second crankshaft"\nratio = -1\nposition = ["0 mm", "640 mm"]\n'

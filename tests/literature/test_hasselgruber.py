@@ -201,8 +201,10 @@ class TestFourCylinder:
         assert np.abs(left[3:] - bare[3:]).max() <= ROUNDING * abs(bare[2]) * SPACING
 
     def test_lanchester_of_the_exact_mechanism(self) -> None:
-        """With exact kinematics lambda in eq. 26 becomes the coefficient lambda + lambda^3/4 + ...; the printed size
-        leaves 1.8 % of the force at this rod."""
+        """Check eq. 26 with exact kinematics, where lambda becomes lambda + lambda^3/4 + ...
+
+        The printed size leaves 1.8 % of the force at this rod.
+        """
         second = abs(piston_acceleration_orders(RATIO, 0.0, 2)[2])
         bare = abs(_loads(self.engine(), EXACT).at(2)[2])
         exact = _loads(self.engine(*self.lanchester(0.5 * MASS * RADIUS * second)), EXACT).at(2)
@@ -221,7 +223,7 @@ class TestFourCylinder:
         assert np.abs(np.delete(left - bare, 3)).max() <= ROUNDING * FORCE
 
     def test_moment_pair_of_the_exact_mechanism(self) -> None:
-        """With exact kinematics the half of eq. 27 is 1/2 + lambda^4/32 + ..., a change of the order of lambda^4."""
+        """Check eq. 27 with exact kinematics, where the half becomes 1/2 + lambda^4/32 + ..."""
         half = abs(inertia_roll_orders(RATIO, 0.0, 1.0, 2)[2])
         assert half - 0.5 == pytest.approx(RATIO**4 / 32, rel=0.1)
         left = _loads(self.engine(*self.moment_pair(half * MASS * RADIUS**2 / 0.2, 0.2)), EXACT).at(2)

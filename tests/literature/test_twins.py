@@ -107,7 +107,7 @@ def test_a_right_angled_vee_fires_at_270_and_450_degrees() -> None:
 
 @pytest.mark.slow
 class TestBalance:
-    """What is left, in forces of one piston's first order."""
+    """Remaining forces, in units of one piston's first order."""
 
     def test_in_step_as_a_single_of_both_pistons(self) -> None:
         """Half of the reciprocating mass in the weights leaves a backward force of half, and nothing forward."""
@@ -125,7 +125,7 @@ class TestBalance:
         )
 
     def test_at_270_degrees_no_secondary_force_is_left(self) -> None:
-        """One balancer against the crank and the webs take all of the first order; couples of the second stay."""
+        """Check that one balancer and the webs take all of order 1, and that couples of order 2 remain."""
         result = _solved("parallel-270")
         assert _shares(result, 2, (1, 2)) == pytest.approx((0.0, 0.0), abs=1e-9)
         assert _shares(result, 1, (1, 2)) == pytest.approx((0.0, 0.0), abs=1e-6)

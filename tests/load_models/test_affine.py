@@ -149,7 +149,7 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
 @settings(max_examples=4)
 @given(x=COLUMNS)
 def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) -> None:
-    """As above; a bearing feels the cylinders beside it alone, so that its period is the whole cycle."""
+    """Compare rows inside the crankcase, whose period may be the whole cycle, with the exact model."""
     p, m, affine = inside()
     assert m.base == p.engine.cycle.base_order
     x = x * affine.scales

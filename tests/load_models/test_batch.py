@@ -48,7 +48,7 @@ def test_memory_limit_changes_a_rounding_only(monkeypatch: pytest.MonkeyPatch) -
 @pytest.mark.parametrize("name", ["tractor-four-lanchester", "vee-two-90"])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
 def test_automatic_holds_over_the_bounds(name: str, tolerance: float) -> None:
-    """All of thousands of designs are within the tolerance, the best ones among them, and few samples are taken."""
+    """Check that thousands of designs are within the tolerance at few samples, and that few designs are exact."""
     problem = load(PROBLEMS / f"{name}.toml")
     values = random_decisions(problem, batch.FEW_DESIGNS)
     designs = prepare(problem.at(replace(problem.fidelity, tolerance=tolerance)))

@@ -25,7 +25,7 @@ def test_roundings_of_what_cancels_are_nothing_and_small_rows_stay() -> None:
 
 
 def test_fewer_rows_have_the_length_of_all() -> None:
-    """Of any sum of three arrays; nothing is compressed where the rows are no more than the arrays."""
+    """Check that compressed rows keep the length of any sum of three arrays, and that few rows stay as they are."""
     r = np.random.default_rng(3)
     parts = [r.normal(size=(40, 2)), r.normal(size=(2, 3, 40, 2))]
     found = compress_rows(parts)

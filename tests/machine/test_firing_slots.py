@@ -20,7 +20,7 @@ def slots(cycle, throws, angle, deviation, sides=(0.5, -0.5)):
 
 
 def least_deviation(cycle, throws, angle):
-    """Of cranks on a grid of angles, every cylinder on any turn of the cycle [deg]."""
+    """Return the least deviation from even firing over cranks on a grid, cylinders on any turn [deg]."""
     layout = vee(2 * throws, 0.1, math.radians(angle))
     count, minimum = 2 * throws, math.inf
     for rest in itertools.product(range(0, 360, GRID), repeat=throws - 1):

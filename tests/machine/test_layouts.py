@@ -76,7 +76,7 @@ class TestPlaces:
 
     @given(st.integers(1, 48), st.floats(1e-3, 10.0))
     def test_stations(self, count: int, spacing: float) -> None:
-        """From the front backwards, a spacing apart, the middle exactly at x = 0 (C2)."""
+        """Check the distance of stations from the front backwards, with the middle exactly at x = 0 (C2)."""
         places = stations(count, spacing)
         assert len(places) == count
         assert [-x for x in reversed(places)] == list(places)
@@ -99,7 +99,7 @@ class TestPlaces:
         assert np.degrees(layout.pin_offsets) == pytest.approx([-15.0] * 3 + [15.0] * 3)
 
     def test_boxer(self) -> None:
-        """Every piston has a throw of its own; opposed ones are the stagger apart."""
+        """Check that every piston has its own throw, and that opposed ones are the stagger apart."""
         layout = boxer(4, 0.12, 0.05)
         assert layout.positions == pytest.approx((0.085, -0.035, 0.035, -0.085))
         assert layout.throw_positions == layout.positions
@@ -200,7 +200,7 @@ class TestFiring:
                 firing_angles(FOUR, inline(3, 0.1), throws, order, [math.radians(x) for x in (190.0, 260.0, 270.0)])
 
     def test_four_stroke_four_cylinder_has_four_orders(self) -> None:
-        """Of all orders of the flat crank 0-180-180-0 those fire evenly in which 1 and 4 do not follow each other."""
+        """Check that two orders of the flat crank 0-180-180-0 fire evenly among those that begin with 1."""
         even = []
         for rest in permutations((2, 3, 4)):
             try:

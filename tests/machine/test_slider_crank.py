@@ -62,7 +62,7 @@ class TestStroke:
 
     @given(st.floats(0.01, 0.5), st.floats(0.0, 0.7), st.floats(-0.9, 0.9), st.booleans())
     def test_radius_for_stroke_is_its_inverse(self, radius: float, ratio: float, share: float, by_ratio: bool) -> None:
-        """From the stroke of a crank back to its radius, with the rod given by length or by ratio."""
+        """Compare the crank radius with that from its own stroke, with the rod given by length or by ratio."""
         length = radius / ratio if ratio > 1e-3 else math.inf
         offset = share * (length - radius) if math.isfinite(length) else 0.0
         part = SliderCrank("c", 0.0, radius, length, 1.0, offset=offset)

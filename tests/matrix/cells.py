@@ -45,7 +45,7 @@ class OpenThrows:
     bounds: tuple[tuple[float, float], ...] = ()
 
     def text(self, values: Mapping[str, float] | None) -> str:
-        """As asked, or as decided."""
+        """Return the value of the key: open without values, else the angles of the throws [deg]."""
         if values is None and not self.bounds:
             return '"open"'
         if values is None:
@@ -294,7 +294,7 @@ MEASURES: Sequence[str] = [
 
 @dataclass(frozen=True)
 class Cell:
-    """One combination; all else follows from it and the seed."""
+    """Combination of decision, measure and layout; its problem file follows from the combination and the seed."""
 
     decision: str
     measure: str
@@ -306,7 +306,7 @@ class Cell:
 
 
 def cells(seed: int = 0) -> list[Cell]:
-    """All of them."""
+    """Return all combinations."""
     return [Cell(*each, seed) for each in itertools.product(DECISIONS, MEASURES, LAYOUTS)]
 
 

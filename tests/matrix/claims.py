@@ -1,4 +1,4 @@
-"""What must hold of a combination: one line refuses it, or it is decided and every claim of the result is true."""
+"""Claims that every combination must meet: one line refuses it, or every claim of its result is true."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Verdict:
-    """Of one combination.
+    """Verdict of one combination.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ def _broken(document: Document, problem: Problem, result: Result, folder: Path) 
 
 
 def _is_searched(problem: Problem) -> bool:
-    """Whether mounts are open, or a number of them that loads move is asked, or throws may leave even steps.
+    """Return whether the problem has open mounts, a number that depends on loads, or throws off even steps.
 
     No program is convex then.
     """
@@ -121,7 +121,7 @@ def _is_searched(problem: Problem) -> bool:
 
 
 def _own_claims(document: Document, problem: Problem, result: Result, folder: Path) -> Iterator[str]:
-    """What the result says of its own design."""
+    """Yield the claims of a result about its own design that do not hold."""
     objective, certificate = result.objective, result.certificate
     assert objective is not None
     assert certificate is not None
@@ -235,7 +235,7 @@ def _other_designs(
 def _of_star(
     document: Document, values: Mapping[str, float], result: Result, generator: random.Random, folder: Path
 ) -> tuple[float, bool] | None:
-    """Of another star and firing order: an even one where throws are open, as given otherwise."""
+    """Return value and validity of another star and firing order: an even one if throws are open."""
     throws, order = document["engine"].get("throws"), None
     even = isinstance(throws, OpenThrows) and not throws.bounds
     if even or document["engine"].get("firing_order") == "open":
@@ -266,7 +266,7 @@ def _evaluated(problem: Problem, engine: Engine, samples: int) -> tuple[float, b
 
 
 def _value(decision: Any, values: Mapping[str, float]) -> complex | float:
-    """Of a decision from its size and its angle."""
+    """Return the value of a decision from its size and its angle."""
     size = values[decision.name]
     if decision.set.width == 1:
         return size * decision.set.directions[0] if decision.is_affine else size
@@ -274,7 +274,7 @@ def _value(decision: Any, values: Mapping[str, float]) -> complex | float:
 
 
 def _acts(document: Document, problem: Problem) -> bool:
-    """Whether every number that is open moves loads, masses or the mounting of some design."""
+    """Return whether every open number changes loads, masses or the mounting of some design."""
     generator = random.Random(1)
     if problem.phasing is not None:
         return True

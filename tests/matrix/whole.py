@@ -1,4 +1,4 @@
-"""Every combination, or a share of them: `make matrix`. Files of those that break a claim go to results/matrix/."""
+"""Check of every combination, or of a share: `make matrix` writes files that break a claim to results/matrix/."""
 
 from __future__ import annotations
 

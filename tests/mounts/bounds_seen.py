@@ -19,7 +19,7 @@ def designs(problem: Problem, low, high, seed: int) -> list[float]:
 
 
 def bounds_over_designs(problem: Problem) -> list[float]:
-    """Of a dozen boxes at random the bound over the least of some designs in it."""
+    """Return the bound over the least of some designs for each of twelve random boxes."""
     search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, evaluate(problem)))
     low, high = boxes(problem, 12, 5)
     bounds, _ = search.bounds(low, high)

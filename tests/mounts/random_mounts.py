@@ -32,7 +32,7 @@ CLEAR = 1e-7
 
 
 class Drawn:
-    """One random problem as the text of a file."""
+    """Random problem as the text of a file."""
 
     def __init__(self, family: str, seed: int, folder: Path) -> None:
         self.folder, self.family, self.rng = folder, family, np.random.default_rng([FAMILIES.index(family), seed])
@@ -44,7 +44,7 @@ class Drawn:
         self.room = [float(self.rng.choice([0.7, 0.9, 1.0, 1.02, 1.3])) for _ in self.limited_quantities]
 
     def text(self, limits: list[str]) -> str:
-        """The file; search short."""
+        """Return the text of the file with these limits and a short search."""
         return "\n".join([*self.lines, *self.objective, *limits, "[search]", "starts = 3", "boxes = 300", ""])
 
     def _between(self, low: float, high: float) -> float:
@@ -240,7 +240,7 @@ def load_text(drawn: Drawn, limits: list[str]) -> Problem:
 
 @dataclass(frozen=True)
 class AttainableLimit:
-    """What a search over the exact model reached: the least objective within all limits, and the least excess."""
+    """Best outcome of a search over the exact model: the least objective within all limits, and the least excess."""
 
     value: float
     violation: float
@@ -297,7 +297,7 @@ def place_of(problem: Problem, result: Result) -> np.ndarray | None:
 
 
 def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
-    """What is wrong with the claims of a solve; nothing where all holds."""
+    """Return the claims of a solve that are wrong; none if all hold."""
     result = solve(problem)
     given = _given(problem)
     out = []

@@ -218,7 +218,7 @@ angle = { between = [0, 360] }
     ],
 )
 def test_what_nothing_open_changes_is_proven(objective: str, opened: str, tmp_path: Path) -> None:
-    """Every design is worth the same, or its share of the objective is known."""
+    """Check the proof of an objective that no open number changes, or that is a known share."""
     stays = '{ between = ["20 N/mm", "4000 N/mm"], start = "400 N/mm" }'
     mounts = MOUNTS if opened == "stiffness" else MOUNTS.replace(stays, '"400 N/mm"')
     parts = (ENGINE.replace("[0, 180, 180, 0]", "[0, 90, 270, 180]"), BLOCK, mounts)

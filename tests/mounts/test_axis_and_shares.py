@@ -142,7 +142,7 @@ def test_every_mode_of_modes_that_coincide_is_allowed_its_share():
 
 
 def test_a_projection_is_no_longer_than_components_allow():
-    """Of unit vectors with bounds of their components; where a vector may have all bounds at once, it has the bound."""
+    """Compare bounds of projections of unit vectors with bounded components, which are exact for short vectors."""
     r = np.random.default_rng(9)
     for size in (2.0, 0.6, 0.2):
         vector, parts = r.normal(size=(30, 6)), np.minimum(size * r.random((30, 1, 6)), 1.0)

@@ -277,7 +277,7 @@ def test_any_damping_makes_the_resonance_finite():
 
 
 def test_stiffness_ratios_of_a_thousand_million():
-    """One mount is a pivot: the block turns about it as if on a hinge."""
+    """Check the pitch frequency of a block that turns about a very stiff mount as about a hinge."""
     hinge = Mount("hinge", (0.3, 0.0, 0.0), (1e14, 1e14, 1e14))
     soft = Mount("soft", (-0.3, 0.0, 0.0), (0.0, 0.0, 1e5))
     sides = [Mount(f"side{k}", (0.3, y, 0.0), (0.0, 0.0, 1e5)) for k, y in enumerate((0.2, -0.2))]

@@ -93,7 +93,7 @@ def test_the_block_settles_where_its_energy_is_least(seed: int, case: LoadCase) 
 
 
 def test_a_travel_that_just_reaches_its_gap_is_found() -> None:
-    """Of a block on four mounts the load at which the first stop is met, to the last digit and about it."""
+    """Check the travel at the load that just closes the first gap, to the last digit and around it."""
     plain = random_mounting(4)
     case = LoadCase("push", force=(3000.0, -2000.0, -9000.0))
     rows = stops_of(plain).rows

@@ -1,4 +1,4 @@
-"""Where a smooth program starts its modes: each in the column of the motion that is most its own."""
+"""Start of modes in a smooth program: each in the column of the motion with most of its energy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def problem() -> Problem:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_motions_and_modes_are_paired_as_an_assignment_pairs_them(problem: Problem, seed: int) -> None:
-    """Of six by six, also where a mode has most of the energy of two motions."""
+    """Compare the pairs of six motions and modes with SciPy's linear assignment."""
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     x = low + (high - low) * np.random.default_rng(seed).random(len(low))
     mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))

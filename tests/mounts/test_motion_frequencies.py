@@ -61,7 +61,7 @@ def test_a_motion_has_the_frequency_of_its_dominant_mode(motion: str) -> None:
 
 
 def test_a_design_stays_in_its_windows() -> None:
-    """At the start roll is at 10.2 Hz and bounce at 8.7 Hz; a local search brings both inside, without a proof."""
+    """Check that a local search moves roll (10.2 Hz) and bounce (8.7 Hz) into their windows, without a proof."""
     problem = load(windows(("roll", "6 Hz", "7 Hz"), ("bounce", "6 Hz", "8 Hz")))
     assert evaluate(problem).violation(problem.limits) > 0.0
     result = solve(problem)

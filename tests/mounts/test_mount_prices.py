@@ -80,7 +80,7 @@ def test_a_price_is_the_slope_of_the_optimum(objective: str, limit: str, within:
 
 
 def test_an_active_limit_never_shows_a_dash(tmp_path: Path) -> None:
-    """What is not known is said to be; a limit that costs nothing costs zero."""
+    """Check that an unknown price shows "not known", and the price of a limit without cost zero."""
     objective = FORCE + '[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n'
     result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, SEARCH))
     for price, said in ((math.nan, "not known"), (0.0, "0 "), (2.0, "0.002000 ")):

@@ -90,7 +90,7 @@ def test_stars_left_out_leave_no_bound(tmp_path):
 
 @pytest.mark.parametrize("best", [1, 2, 50])
 def test_stars_are_counted_and_as_many_as_are_asked_for_are_kept(best, tmp_path):
-    """Of four throws two each stand at 0 and 180 degrees, the first at 0: three ways, the best ones first."""
+    """Check the three stars of four throws at 0 and 180 degrees, and that the best ones come first."""
     problem = problem_of(tmp_path, *parts(), f"[phasing]\nbest = {best}\n")
     ranked, designs = _stars(problem, problem.phasing)
     assert designs == math.comb(3, 1) == len(STARS)
@@ -158,7 +158,7 @@ def test_limits_that_contradict_on_every_star_are_named(tmp_path):
 
 @pytest.mark.slow
 def test_throws_that_fire_unevenly_get_the_firing_order_that_gas_likes_best(tmp_path):
-    """Every order with mounts of its own: none is better, and none lies under the bound."""
+    """Compare the decided firing order with each order solved by itself on its own mounts."""
     gas = '[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "8 bar"\n'
     wide = '[phasing]\nintervals = { min = "20 deg", max = "700 deg" }\n'
     engine = changed(ENGINE, ("[[operating_points]]", 'bore = "80 mm"\nfiring_order = "open"\n[[operating_points]]'),

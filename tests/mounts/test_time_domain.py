@@ -111,7 +111,7 @@ def test_standstill_is_refused():
 
 
 def test_roll_of_the_block_is_the_turn_that_its_mounts_tell():
-    """Of any motion: travels of three mounts determine it, and its turn about x is told alone."""
+    """Compare the roll of random motions with the turn about x that the travels of three mounts determine."""
     mounting = powertrain(damping=20.0)
     model, rng = time_model(mounting), np.random.default_rng(5)
     middle = np.array(mounting.block.centre_of_gravity)

@@ -31,7 +31,7 @@ EXTREMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimu
 
 @dataclass(frozen=True)
 class Mutant:
-    """One changed line of a file below `src`.
+    """Changed line of a file below `src`.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Mutant:
     before, after
         The line without and with the change.
     repeat
-        How many equal changes its function has above it.
+        Count of equal changes above it in the function.
     """
 
     file: str

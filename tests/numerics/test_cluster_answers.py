@@ -15,7 +15,7 @@ pytestmark = of_clusters("distributed")
 
 
 class Call:
-    """As `distributed.Future`: what is done, and what comes of fetching it."""
+    """Stand-in for `distributed.Future` with a status and a function that fetches its result."""
 
     def __init__(self, status: str, fetch: Callable[[], Any]) -> None:
         self.status, self._fetch = status, fetch
@@ -31,7 +31,7 @@ class Call:
 
 
 class Client:
-    """Whose first answers cannot be fetched, because a connection ends."""
+    """Stand-in for a client whose first answers cannot be fetched, because a connection ends."""
 
     status, scheduler = "running", None
 
@@ -61,7 +61,7 @@ class Client:
 
 
 def half(number: int) -> float:
-    """Of an even number."""
+    """Return half of an even number."""
     if number % 2:
         raise ValueError(f"{number} is odd")
     return 0.5 * number

@@ -237,7 +237,7 @@ class TestDefinitions:
 
 @every_norm
 class TestForms:
-    """One norm in the words of cone programs, smooth programs and batches."""
+    """Forms of a norm in cone programs, smooth programs and batches."""
 
     @given(rows(), st.floats(-10.0, 10.0))
     def test_it_is_a_norm(self, norm: Norm, data: tuple[np.ndarray, ...], factor: float) -> None:
@@ -341,7 +341,7 @@ class TestForms:
 
 @every_norm
 class TestDualRows:
-    """What proofs make of the dual rows of a solver (P6)."""
+    """Dual rows of a solver as proofs use them (P6)."""
 
     @given(SEEDS)
     def test_aligned_rows_are_allowed_and_no_worse(self, norm: Norm, seed: int) -> None:
@@ -412,7 +412,7 @@ class TestWeightless:
 
 
 class TestWorstMean:
-    """What operating points make of it: groups, whose shares the dual rows tell."""
+    """Worst mean over operating points as groups, whose shares the dual rows give."""
 
     @given(SEEDS)
     def test_it_is_the_largest_of_the_means(self, seed: int) -> None:

@@ -111,7 +111,7 @@ class TestOneSignal:
 class TestOrders:
     @given(spectra())
     def test_at(self, s: Spectrum) -> None:
-        """Every order is found by its number; what lies between, below and above is zero."""
+        """Check that an order is found by its number, and that orders between, below and above are zero."""
         for order, c in zip(s.orders, s.coefficients, strict=True):
             assert (s.at(float(order)) == c).all()
         assert (s.at(float(s.base) / 2) == 0.0).all()

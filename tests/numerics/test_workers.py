@@ -86,7 +86,7 @@ def test_calls_are_worked_on_side_by_side(tmp_path: Path) -> None:
 
 def test_who_works_may_be_asked_while_workers_begin(monkeypatch: pytest.MonkeyPatch) -> None:
     class Begun:
-        """As a process, without one."""
+        """Stand-in for a process."""
 
         pid, stdin, stdout = 0, None, None
 

@@ -130,7 +130,7 @@ def _design(problem: Problem, window: FiringWindow, angles: Array) -> Candidate:
     ids=range(12),
 )
 def test_waves_and_windows_are_those_of_the_exact_model(text: str, gas: str, name: str) -> None:
-    """At random angles of every kind: loads, and the firing intervals that a window tells."""
+    """Compare loads and firing intervals of windows at random angles with the exact model."""
     problem = _read(text + gas + MOUNTS + _objective(name))
     phasing, measure, rng = problem.phasing, problem.objective[0].measure, np.random.default_rng(3)
     windows, firing = windows_of(problem, phasing), firing_bounds(phasing)
@@ -242,7 +242,7 @@ def test_an_open_order_takes_the_better_one() -> None:
 
 @pytest.mark.slow
 def test_intervals_bound_the_bank_angle() -> None:
-    """At most 420 degrees between firings leave a bank of 60 at most, and none is left by 380."""
+    """Check that firing intervals of at most 420 deg bound the bank angle by 60 deg, and that 380 deg allow none."""
     text = TWIN + MOUNTS + WEIGHTS + _objective("rms shaking force")
     result = solve(_read(changed(text, "min = 225, max = 495", "min = 300, max = 420")))
     assert math.degrees(result.phasing.ranking[0].bank_angle) == pytest.approx(60.0, abs=1e-4)

@@ -52,7 +52,7 @@ def test_corners_between_the_angles_neither_open_a_gap_nor_raise_a_bound(samples
 
 @pytest.mark.slow
 def test_more_angles_leave_the_gas_its_steps() -> None:
-    """What is told is what whoever evaluates the file finds at as many angles."""
+    """Compare the value of a result at more angles with an evaluation of its design at as many."""
     single = SIX.replace("cylinders = 6", "cylinders = 1").replace("opposite_throw = 5", "opposite_throw = 1")
     gas = '[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "7 bar"\n[fidelity]\nsamples = 96\n'
     bearings = '[[main_bearings]]\nx = "60 mm"\n[[main_bearings]]\nx = "-60 mm"\n'

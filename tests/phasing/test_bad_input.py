@@ -1,4 +1,4 @@
-"""What cannot be: one clear line, the right status, and nothing sold for more than it is."""
+"""Bad input of open cranks: one clear line, the right status, and no false claim."""
 
 import pytest
 

@@ -95,7 +95,7 @@ def _turn(decision):
 
 @pytest.mark.parametrize("built", [(), (0,), (1,), (0, 1)])
 def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, built):
-    """One star, the shafts that are not built taken out of the file's engine, and a weight that is always there."""
+    """Compare a set of built shafts on one star with the problem of these shafts alone."""
     weight = engines.WEIGHTS.partition('[[counterweights]]\nname = "rear"')[0]
     problem = engines.problem(tmp_path, 3, rest=engines.MOUNTS + weight + TWO_SHAFTS + engines.MOUNT_FORCE)
     model, stars = model_of(problem)
@@ -194,7 +194,7 @@ def test_cuts_never_exceed_an_optimum(tmp_path, name):
 
 @pytest.mark.slow
 def test_limits_that_contradict_each_other_at_one_star_exclude_others(tmp_path):
-    """By what each star has when it is solved alone: a star with a design is excluded by none."""
+    """Check that a contradiction at one star excludes many stars, and none that has a design."""
     couple = '[[constraints]]\nlimit = "rms rocking couple"\nmax = "850 N m"\n'
     problem = engines.problem(tmp_path, 5, rest=CASES["limited"] + couple)
     model, stars = model_of(problem)
@@ -256,7 +256,7 @@ def test_given_throws_get_the_firing_order_that_gas_likes_best(tmp_path, measure
 
 
 def test_given_throws_that_break_a_limit_are_no_design(tmp_path):
-    """With nothing but the firing order open, limits are looked at too."""
+    """Check that limits hold for given throws with only the firing order open."""
     limit = '[[constraints]]\nlimit = "maximum mount force"\nmax = "1 N"\n'
     rest = engines.MOUNTS + engines.MOUNT_FORCE + limit
     engine = 'throws = [0, 240, 120]\nfiring_order = "open"'
@@ -269,7 +269,7 @@ def test_given_throws_that_break_a_limit_are_no_design(tmp_path):
 @pytest.mark.parametrize("measure", ["rms shaking force", "mean mount force", "rms shaking force, mean rocking couple"])
 @pytest.mark.parametrize("cylinders", [3, 4, 5])
 def test_an_order_that_every_star_cancels_asks_for_nothing(tmp_path, cylinders, measure, order):
-    """What is left of it is a rounding, and no size that unbalances could be counted in."""
+    """Check that roundings of an order that all stars cancel set no scale for unbalances."""
     names = measure.split(", ")
     terms = f'[[objective.terms]]\nquantity = "{names[0]}"\norders = [{order}]\n'
     terms += "".join(f'[[objective.terms]]\nquantity = "{name}"\n' for name in names[1:])

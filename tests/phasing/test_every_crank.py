@@ -1,4 +1,4 @@
-"""What is called the best of all cranks is: each of them is evaluated by the exact model, one by one."""
+"""Best of all cranks, compared with each crank by the exact model."""
 
 import itertools
 import math

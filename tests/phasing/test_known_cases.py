@@ -1,4 +1,4 @@
-"""What the field knows, found without being told."""
+"""Known results of the field, found by the search."""
 
 import json
 import math

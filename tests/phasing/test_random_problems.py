@@ -15,7 +15,7 @@ from problem_files import loaded
 
 
 def problem_of(folder, seed):
-    """Of a seed; None where the reader refuses it with a line."""
+    """Return the problem of a seed, or None if the reader refuses it with a line."""
     try:
         return loaded(folder, Writer(seed).text())
     except InputError:

@@ -62,14 +62,14 @@ def test_a_shaft_without_room_is_left_out(name: str, throws: Any) -> None:
 
 
 def test_shafts_that_are_wanted_and_have_no_room_are_named() -> None:
-    """Where the force is limited too, no choice is left."""
+    """Check that shafts without room are infeasible if a limit on the force needs them."""
     maximum = {"limit": "rms shaking force", "max": "1000 N", "name": "force"}
     result = _solved([LIMITS["one is beyond the envelope"][0], maximum])
     assert str(result.status) == "infeasible"
 
 
 def test_a_limit_may_name_a_shaft_that_is_not_built() -> None:
-    """Of it there is no distance, and nothing is broken."""
+    """Check that the distance to a shaft that is not built is infinite and not active."""
     result = _solved([{"limit": "shaft distance", "of": ["near", "far"], "min": "470 mm"}], most_shafts=1)
     assert result.limits[0].value == math.inf
     assert not result.limits[0].active

@@ -1,4 +1,4 @@
-"""How many steps over the period the bounds of boxes of throws are worth, and what a peak may hide between them."""
+"""Steps over the period for bounds of boxes of throws, and the error of a peak between steps."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_steps_are_asked_for_where_boxes_tell_no_more():
 
 
 def test_a_peak_misses_no_more_than_told(tmp_path):
-    """What fine samples are over coarse ones and those half way between, and a share that falls with the step."""
+    """Check that fine samples exceed coarse ones by no more than the error estimate, which falls with the step."""
     rest = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "maximum")
     problem = engines.problem(tmp_path, 3, "two-stroke", "throws = [0, 100, 230]", "", rest, samples=96)
     design, measure = evaluate(problem), problem.objective[0].measure

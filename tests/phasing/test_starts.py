@@ -1,4 +1,4 @@
-"""Where the search of uneven throws starts: stars turned back, and throws within bounds of their own."""
+"""Starts of the search of uneven throws: reversed stars, and throws within bounds of their own."""
 
 import math
 from dataclasses import replace

@@ -263,7 +263,7 @@ def test_bound_and_design_enclose_the_best_of_a_grid(tmp_path, rest):
 
 @pytest.mark.slow
 def test_steps_over_the_cycle_do_not_hold_a_bound_back(tmp_path):
-    """One throw and gas: the first 96 steps alone cost 4 % of the mean force, and the bound comes nearer than that."""
+    """Check a gap below 0.3 % where the first 96 steps alone would cost 4 % of the mean force."""
     engine = BOUNDED.replace("{ between = [60, 180] }", "120")
     rest = engines.MOUNTS + GAS + engines.MOUNT_FORCE
     result = solve(engines.problem(tmp_path, 3, "two-stroke", engine, "", rest, samples=720))
@@ -291,7 +291,7 @@ def test_a_limit_that_no_crank_keeps_is_named(tmp_path):
 
 
 def test_rows_lose_only_components_that_nothing_loads():
-    """One component has a constant alone, one a slope, one waves, and one nothing."""
+    """Check that compression removes only the component without constant, slope and wave."""
     constant, slope = np.zeros((5, 4)), np.zeros((5, 4, 2))
     waves = np.zeros((1, 2, 5, 4), dtype=complex)
     constant[1, 0], slope[2, 1, 0], waves[0, 1, 3, 2] = 3.0, -4.0, 5.0j

@@ -111,7 +111,7 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
 
 
 def test_prices_are_those_of_an_end_as_good_as_the_best_crank(tmp_path, monkeypatch):
-    """Of ends to both sides of a crank one is better; the worse one tells nothing of its limits."""
+    """Check that prices are computed only at the better of two ends on both sides of a crank."""
     phasing = engines.problem(tmp_path, 6, phasing='intervals = { largest_deviation = "8 deg" }').phasing
     throws = tuple(math.tau * p / 6 for p in (0, 3, 1, 5, 2, 4))
     order = tuple(int(k) + 1 for k in np.argsort([-angle % math.tau for angle in throws]))
@@ -131,7 +131,7 @@ def test_prices_are_those_of_an_end_as_good_as_the_best_crank(tmp_path, monkeypa
 
 
 def test_a_start_that_fires_too_unevenly_leads_to_a_crank_that_does_not(tmp_path):
-    """With an open weight, and no design to begin from: as good as the even star with the best weight."""
+    """Check that an infeasible start ends at intervals within limits, no worse than the even star."""
     weight = engines.WEIGHTS.partition('[[counterweights]]\nname = "rear"')[0]
     allowed = 'intervals = { largest_deviation = "5 deg" }'
     phasing = engines.problem(tmp_path, 3, "two-stroke", phasing=allowed, rest=weight + engines.COUPLE).phasing

@@ -161,7 +161,7 @@ def decided(quantity: str) -> tuple[Problem, Result]:
 @pytest.mark.slow
 @pytest.mark.parametrize("quantity", DECIDED)
 def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
-    """Every throw on its arc in steps, the weight at its optimum there."""
+    """Check that no crank on a grid of throw angles, with its best weight, is below the bound."""
     problem, result = decided(quantity)
     weights = bool(problem.unbalances)
     phasing, steps = problem.phasing, 3 if weights else 6

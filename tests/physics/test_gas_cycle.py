@@ -326,7 +326,7 @@ class TestWiebe:
 
     @every_cycle
     def test_bends_alone_make_the_error(self, cycle: Cycle) -> None:
-        """With dead centres and both ends of the burn on samples, one extrapolation leaves the fourth order."""
+        """Check fourth order after one extrapolation with dead centres and ends of the burn on samples."""
         gas, part = replace(BURN, duration=math.radians(60)), PARTS["plain"]
         coarse, fine = (
             indicated_mean_pressure(cylinder_pressure(gas, part, cycle, n * cycle.turns), part, cycle)
@@ -557,7 +557,7 @@ class TestRefusals:
         _one_line(error, *words)
 
     def test_range_told_is_the_range_that_can_be_reached(self) -> None:
-        """What lies just inside either end is met, what lies just outside is refused."""
+        """Check that a mean pressure just inside the stated range is accepted, and just outside refused."""
         minimum, maximum = (seiliger_imep(DIESEL, Cycle.FOUR_STROKE, ratio) for ratio in (1.0, 17.0))
         for inside in (minimum + 1.0, maximum - 1.0):
             seiliger_cut_off(replace(DIESEL, imep=inside), Cycle.FOUR_STROKE)
@@ -578,7 +578,7 @@ class TestRefusals:
 
     @pytest.mark.parametrize("completeness", [0.999, 0.4])
     def test_most_heat_is_what_is_burnt(self, completeness: float) -> None:
-        """What a charge can hold is bound by the heat released, 50 p V of the charge."""
+        """Check that the largest heat of a charge is the heat released, 50 p V."""
         gas = replace(BURN, completeness=completeness)
         part, cycle = PARTS["plain"], Cycle.TWO_STROKE
         unit = wiebe_heat(gas, part, cycle) / gas.imep
@@ -623,7 +623,7 @@ class TestHasselgruber:
         assert self.force(DIESEL) == pytest.approx(300.0, rel=0.15)
 
     def test_what_it_hangs_on(self) -> None:
-        """Whether 80 kp/cm2 is absolute or a gauge pressure hardly matters; the compression ratio does."""
+        """Check that a gauge pressure of 80 kp/cm2 changes the force little, and the compression ratio much."""
         assert self.force(replace(DIESEL, peak_pressure=81 * AT)) == pytest.approx(263, abs=1.5)
         assert self.force(replace(DIESEL, compression_ratio=20.5)) == pytest.approx(300, abs=3)
 

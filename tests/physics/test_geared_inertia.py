@@ -45,7 +45,7 @@ def twin() -> tuple[Problem, Result]:
 
 @pytest.mark.parametrize("shares", [((-1.0, 0.3),), ((-2.0, 0.5), (1.5, 0.2)), ((0.5, 0.9),)])
 def test_the_roll_moment_is_what_angular_momentum_and_load_leave(shares: Any) -> None:
-    """Of discs and point masses at the speed that the crank has, differentiated in time by its spectrum."""
+    """Compare the roll moment with the rate of angular momentum of discs and point masses at uneven speed."""
     problem = problem_of()
     inertia, steps = 0.05, 1440
     fidelity = Fidelity(samples=steps, crank_inertia=inertia)
@@ -67,7 +67,7 @@ def test_the_roll_moment_is_what_angular_momentum_and_load_leave(shares: Any) ->
 
 
 def test_two_cranks_leave_the_difference_of_their_inertias() -> None:
-    """Of the alternating torque (J1 - J2) / (J1 + J2), and all of the mean (textbook Fig. 4.1)."""
+    """Check that (J1 - J2) / (J1 + J2) of the alternating torque remains, and all of the mean (textbook Fig. 4.1)."""
     problem = problem_of()
     parts = tuple(replace(part, reciprocating_mass=0.0) for part in problem.engine.slider_cranks)
     engine, point = replace(problem.engine, slider_cranks=parts), problem.points[1]
@@ -96,7 +96,7 @@ def test_an_even_speed_is_the_limit_of_much_inertia_and_parts_add_up() -> None:
 
 @pytest.mark.parametrize("inertia", [None, "0.4 kg m^2"])
 def test_a_share_is_decided_with_unbalances_and_proven(twin: tuple[Problem, Result], inertia: str | None) -> None:
-    """At even and at uneven speed: no design of a grid is better, or under the bound; more freedom is never worse."""
+    """Check by a grid of unbalance and share that no design is better, at even and at uneven speed."""
     problem, result = twin
     if inertia is not None:
         own = {"samples": 240, "crank_inertia": inertia}

@@ -128,7 +128,7 @@ def test_an_energy_balance_over_the_cycle_holds() -> None:
 
 
 def test_stored_work_is_affine_in_unbalances() -> None:
-    """With weights a counterweight changes stored work and irregularity, which it does not without (P1)."""
+    """Check that with gravity a counterweight changes stored work (affine) and irregularity (P1)."""
     web = {"name": "web", "x": "0 mm", "opposite_throw": 1, "unbalance": {"between": ["0 kg m", "0.3 kg m"]}}
     changes = {
         "counterweights": [web], "objective": {"minimise": "peak to peak stored work"}, "constraints": [],

@@ -50,7 +50,7 @@ STROKES = {Cycle.TWO_STROKE: 1, Cycle.FOUR_STROKE: 2}
 
 @dataclass(frozen=True)
 class Bodies:
-    """One cylinder's rigid bodies; the rod is None for a Scotch yoke."""
+    """Rigid bodies of a cylinder; the rod is None for a Scotch yoke."""
 
     part: SliderCrank
     piston_mass: float
@@ -255,10 +255,10 @@ class TestSymmetry:
 class TestMomentum:
     @given(scenes(), st.lists(st.floats(0.0, 12.6), min_size=2, max_size=2))
     def test_loads_are_the_change_of_momentum(self, scene: Scene, angles: list[float]) -> None:
-        """All orders summed at an angle are -d/dt of momentum and angular momentum of everything that moves.
+        """Compare all orders at an angle with -d/dt of momentum and angular momentum of all moving bodies.
 
         The flywheel, too heavy to change its speed, takes the torque that the kinetic
-        energy of the others gives or asks for (C7).
+        energy of the others gives or needs (C7).
         """
         loads = loads_of(scene.engine)
         expected = np.array([_momentum_change(scene, angle) for angle in angles])
@@ -279,7 +279,7 @@ class TestMomentum:
 
 
 def _size(loads: Spectrum) -> float:
-    """Of loads anywhere in the cycle: at one angle they may be zero, up to the rounding of that angle."""
+    """Return the largest order of loads plus 1e-9, a size that is not zero at any angle."""
     return float(np.abs(loads.coefficients).max()) + 1e-9
 
 

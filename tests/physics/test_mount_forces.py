@@ -82,7 +82,7 @@ class TestStatics:
 
     @given(mountings(), WRENCHES)
     def test_mounts_give_way_as_one_body_moves(self, mounts: tuple[Mount, ...], wrench: NDArray[np.complex128]) -> None:
-        """Of all forces in equilibrium, those that springs under one rigid block take: K^-1 F = u + omega x r."""
+        """Check that the mount deflections K^-1 F are those of one rigid body, u + omega x r."""
         found = forces(mounts, wrench)
         give = np.concatenate([np.linalg.solve(m.stiffness_matrix, f) for m, f in zip(mounts, found, strict=True)])
         motions = np.concatenate([np.hstack([np.eye(3), _cross(m.position)]) for m in mounts])
@@ -224,7 +224,7 @@ class TestUncarried:
         ],
     )
     def test_the_rest_is_carried(self, mounts: Sequence[Mount], carried: Sequence[str]) -> None:
-        """Every other direction is in equilibrium, and no mount pulls where it has no stiffness."""
+        """Check equilibrium in every carried direction, and zero force where a mount has no stiffness."""
         for component in carried:
             found = forces(mounts, unit(component))
             np.testing.assert_allclose(resultant(mounts, found), unit(component), atol=1e-12)
@@ -232,13 +232,13 @@ class TestUncarried:
                 assert np.abs(force[np.array(mount.stiffness) == 0.0]).max(initial=0.0) < 1e-14
 
     def test_a_force_through_the_only_mount(self) -> None:
-        """One mount aside carries what acts through it."""
+        """Check that a single mount carries a force that acts through it."""
         mount, force = Mount("a", (0.5, 0.3, -0.2), ALL), np.array([1.0, -2.0, 3.0], dtype=complex)
         wrench = np.concatenate([force, np.cross(mount.position, force)])
         np.testing.assert_allclose(forces([mount], wrench)[0], force, rtol=1e-13)
 
     def test_a_rounding_is_no_load(self) -> None:
-        """What is 1e-9 of the load is left to rounding, what is 1e-8 of it is not."""
+        """Check that 1e-10 of the load in an uncarried direction is accepted, and 1e-8 refused."""
         wrench = unit("Fz")
         forces(FOUR, wrench + 1e-10 * unit("Fx"))
         with pytest.raises(UncarriedLoadError, match="along Fx"):
@@ -254,7 +254,7 @@ class TestUncarried:
         assert not forces([Mount("a", (0.0, 0.0, 0.0))], np.zeros(6, dtype=complex)).any()
 
     def test_the_order_is_named(self) -> None:
-        """Of several orders the one that drives most."""
+        """Check that the message names the order with the largest uncarried load."""
         c = np.zeros((6, 6), dtype=complex)
         c[1, 0], c[5, 0] = 1.0, 7.0
         with pytest.raises(UncarriedLoadError, match=r"order 2\.5 drives"):

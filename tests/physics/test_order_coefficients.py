@@ -115,7 +115,7 @@ class TestAgainstManyDigits:
 
     @pytest.mark.parametrize(("rod_ratio", "offset_ratio"), OFFSET)
     def test_offset(self, rod_ratio: float, offset_ratio: float) -> None:
-        """With an offset every order, each to 1e-14 of itself: those of 1e-90 of the largest too."""
+        """Check every order with a pin offset to 1e-14 of itself, also orders of 1e-90 of the largest."""
         exact = _reference(acceleration, rod_ratio, offset_ratio)
         computed = piston_acceleration_orders(rod_ratio, offset_ratio, HIGHEST)
         assert computed[0] == 0.0
@@ -167,7 +167,7 @@ class TestAgainstTextbookSeries:
 
     @staticmethod
     def coefficient(order: int, power: int) -> Fraction:
-        """Of lambda^power in A_order, from the binomial series of sqrt(1 - lambda^2 sin^2 a), in fractions."""
+        """Return the factor of lambda^power in A_order from the binomial series of sqrt(1 - lambda^2 sin^2 a)."""
         n, half = (power + 1) // 2, order // 2
         if n < half:
             return Fraction(0)
@@ -270,7 +270,7 @@ class TestProperties:
 
     @given(rod_ratio=st.floats(0.05, 0.95), share=st.floats(0.05, 1.0), sign=st.sampled_from([-1.0, 1.0]))
     def test_leaving_offset_or_higher_orders_out_shows(self, rod_ratio: float, share: float, sign: float) -> None:
-        """What the property of the whole series rests on: without the offset, or above order 2, it fails."""
+        """Check that the comparison of the series fails without the offset or above order 2."""
         offset_ratio = sign * share * (0.97 - rod_ratio)
         alpha = np.linspace(0.0, math.tau, 73)
         kernel = slider_crank.piston_acceleration(np, alpha, rod_ratio, offset_ratio)

@@ -259,7 +259,7 @@ def test_the_diagram_is_drawn_where_it_is_asked(tmp_path: Path) -> None:
 
 
 def test_two_orders_reach_the_torque() -> None:
-    """Of plain pistons it is the roll moment's (T1), and nears the exact one as rods grow; bounds of errors show it."""
+    """Compare the two-order torque with the roll moment (T1), and its error with the square of the rod ratio."""
     problem = laufruhe.load(PROBLEMS / "tractor-four-bearings.toml")
     still, short = replace(problem.points[0], gas=None), Fidelity("two-order")
     engine = replace(problem.engine, rotors=(), mounts=(), block=None)

@@ -113,7 +113,7 @@ def test_places_are_spread_as_little_as_may_be() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 7, 30])
 def test_spread_places_are_moved_by_the_least_squares(count: int) -> None:
-    """As another library finds it."""
+    """Compare spread places with isotonic regression of SciPy."""
     places = np.sort(np.random.default_rng(count).random(count))
     steps = 0.01 * np.arange(count)
     other = np.clip(isotonic_regression(places - steps).x, 0.0, 1.0 - steps[-1]) + steps

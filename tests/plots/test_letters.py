@@ -49,7 +49,7 @@ def install(folder: Path, name: str, drawn: str) -> None:
 
 @pytest.fixture(autouse=True)
 def few_fonts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Those that come with matplotlib; what a test installs is gone after it."""
+    """Leave only the fonts of matplotlib, and remove installed fonts after the test."""
     monkeypatch.setattr(fontManager, "ttflist", [e for e in fontManager.ttflist if e.name.startswith("DejaVu")])
     monkeypatch.setattr(letters, "_stand_ins", {})
     letters._other_fonts.cache_clear()

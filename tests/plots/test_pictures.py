@@ -79,7 +79,7 @@ def test_polar_diagrams_are_the_samples() -> None:
 
 
 def test_the_ring_stands_where_the_first_cylinder_fires() -> None:
-    """Of a V engine that is not where the crank angle is zero (C5)."""
+    """Check that the ring of a V engine stands at its first firing, not at crank angle zero (C5)."""
     result = evaluate_only(load(PROBLEMS / "vee-two-90.toml"))
     cycle, first = result.final.engine.cycle.angle, result.final.engine.cylinders[0]
     assert first.firing_angle > 0.1

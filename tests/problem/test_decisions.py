@@ -104,7 +104,7 @@ class TestCouplings:
     @pytest.mark.parametrize("then", SENSES)
     @pytest.mark.parametrize("how", SENSES)
     def test_followers_follow(self, folder: Path, how: str, then: str) -> None:
-        """One decision moves the leader, its follower, and the follower of that; as given and as decided."""
+        """Check that one decision moves the leader, its follower, and the follower of that."""
         problem = problem_of(folder, coupled(how, then))
         (decision,) = problem.decisions
         assert decision.name == "leader.unbalance"
@@ -118,7 +118,7 @@ class TestCouplings:
         assert all(by_name[name].radius == 0.02 for name in ("leader", "follower.front", "follower.rear"))
 
     def test_a_mirrored_pair_makes_an_upright_force(self, folder: Path) -> None:
-        """What the coupling is for: the lateral forces of two contra-rotating shafts cancel at any angle."""
+        """Check that the lateral forces of two contra-rotating shafts cancel at any angle."""
         problem = problem_of(folder, coupled("mirrored", "equal"))
         rotors = [r for r in problem.design([0.2 + 0.1j]).rotors if r.name in ("leader", "follower.front")]
         force = rotor_loads(rotors, 100.0, problem.engine.cycle).at(2)
@@ -167,7 +167,7 @@ class TestCounterweights:
         assert found["web.2"] == pytest.approx(-mass * 0.06 * cmath.exp(1j * math.radians(135)))
 
     def test_rotating_masses_balanced(self, folder: Path) -> None:
-        """With a fraction of zero the engine shakes with its pistons alone."""
+        """Check that a balance factor of zero leaves no rotating load."""
         balanced = problem_of(folder, '[[counterweights]]\nname = "web"\nbalance_factor = 0\n')
         left = rotating_loads(balanced.engine, 100.0).coefficients
         assert abs(left[:, :3]).max() <= 1e-12
@@ -218,7 +218,7 @@ class TestCounterweights:
     def test_split_names_size_and_angle(
         self, folder: Path, size: float, bounds: tuple[float, float], share: float
     ) -> None:
-        """What a report prints makes the value again, and the angle lies within its own bounds."""
+        """Check that the reported size and angle make the value again, within the bounds of the angle."""
         low, high = (math.degrees(b) for b in bounds)
         text = f"""
         [[counterweights]]

@@ -1,8 +1,8 @@
-"""Every entry of the table of dependences, sampled on random engines. Samples refute an entry and never prove it.
+"""Entries of the table of dependences, sampled on random engines. Samples refute an entry and never prove it.
 
-Engines are the ready ones with random masses, unbalances and speeds; what is open stands at random places within its
+Engines are the ready ones with random masses, unbalances and speeds; open numbers stand at random places within their
 bounds. SMOOTH claims nothing that three samples could refute, and MASSES and SWING follow from AFFINE and SHIFT of
-what they are made of. Stars are drawn of what is open of throws and firing orders.
+their parts. Stars are drawn from the open throws and firing orders.
 """
 
 from __future__ import annotations
@@ -223,7 +223,7 @@ def test_samples_refute_what_is_wrong(claim: Dependence, at: tuple[float, float,
 
 @pytest.mark.slow
 def test_leads_shift_what_each_shaft_carries() -> None:
-    """Of one order a lead turns what its shaft carries: each further step moves a coefficient as far as the last."""
+    """Check that equal steps of a lead move a coefficient of one order by equal distances."""
     seen = 0
     for number, path in enumerate(path for path in _ready() if "lead" in path.read_text()):
         problem = laufruhe.load(path)

@@ -122,7 +122,7 @@ class TestColumns:
             assert u == complex(*factors)
 
     def test_side_by_side(self) -> None:
-        """One column with the angle fixed, two without, none shared."""
+        """Check one column with the angle fixed, two with it open, and none shared."""
         kinds = [domain(0.0, 1.0, 0.3, 0.3), domain(0.0, 1.0, 0.0, 1.0), domain(-1.0, 0.5, 0.0, 0.0)]
         found = domains_of(tuple(d.decision for d in kinds))
         assert [(d.start, d.width) for d in found] == [(0, 1), (1, 2), (3, 1)]

@@ -240,12 +240,12 @@ class TestParse:
                 parse(text, unit)
 
     def test_newton_metres_in_one_word(self) -> None:
-        """As engineers write them; a registry may take them for a count of yarn."""
+        """Check "Nm", which a registry may take for a count of yarn."""
         assert parse("120 Nm", "N m") == 120.0
 
     @pytest.mark.parametrize("expected", COMMON)
     def test_common_units_are_those_of_the_registry(self, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        """What is known without it, to the last bit; and what it does not take for this dimension, they do not."""
+        """Compare all common units with the registry to the last bit, refused units included."""
         common = dict(COMMON)
         monkeypatch.setattr(module, "COMMON", {})
         for unit in {unit for row in common.values() for unit in row}:
@@ -269,7 +269,7 @@ class TestParse:
 
     @pytest.mark.parametrize("unit", DIMENSIONS)
     def test_examples_are_right(self, unit: str) -> None:
-        """What a message tells the user to write can be read."""
+        """Check that the example of every unit can be read."""
         assert math.isfinite(parse(example(unit), unit))
         assert dimension_name(unit)
 

@@ -80,7 +80,7 @@ def test_what_is_left_bounds_all_that_was_not_looked_at(maximum: int) -> None:
 
 
 def test_places_told_are_the_middles_of_the_least_boxes_left() -> None:
-    """Of the square of the distance from a place, bounded on each box by its nearest point."""
+    """Check that the named places are near the minimum of a squared distance."""
     place = np.array([2.3, 7.1])
 
     class Distance:

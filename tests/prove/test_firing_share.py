@@ -1,4 +1,4 @@
-"""What all even stars share bounds each of them, with any weights."""
+"""Bound of every even star by the loads that all share, with any weights."""
 
 from __future__ import annotations
 

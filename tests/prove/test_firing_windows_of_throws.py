@@ -1,4 +1,4 @@
-"""How far throws may stand from the even steps: as far as the ends of allowed firing intervals bring them (S24)."""
+"""Distance of throws from the even steps, as far as the ends of allowed firing intervals move them (S24)."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 
 
 def test_the_least_excess_is_never_over_that_of_a_linear_program() -> None:
-    """Of two limits it is that exactly; of more it is under it, and mostly tells what it tells."""
+    """Compare the least excess with a linear program: equal for two limits, not above for more."""
     r = np.random.default_rng(6)
     tight = []
     for _ in range(80):
@@ -38,7 +38,7 @@ def test_the_least_excess_is_never_over_that_of_a_linear_program() -> None:
 
 
 def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
-    """Every two leave a side along which both are kept; (n1 + n2) / 2 is mixed with n3 until no side is left."""
+    """Check that three limits exclude a box that each two of them allow."""
     over, n = 0.1, np.array([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]])
 
     def violation(which: list[int]) -> float:

@@ -1,4 +1,4 @@
-"""What is under a box is under every design in it, and dividing ends at a proven optimum (E37-E41)."""
+"""Bounds of boxes against designs within, and division that ends at a proven optimum (E37-E41)."""
 
 from __future__ import annotations
 
@@ -316,7 +316,7 @@ orders = [1, 2]
 
 
 def test_where_boxes_are_least_is_a_design_too(tmp_path: Path) -> None:
-    """Every start of the smooth search ends elsewhere, 0.4 % worse."""
+    """Check that boxes find the optimum where every start of the smooth search ends 0.4 % worse."""
     path = tmp_path / "far.toml"
     path.write_text(FAR_FROM_ALL_STARTS, encoding="utf-8")
     problem = load(path)

@@ -1,4 +1,4 @@
-"""Every variable of every dataset says what it is, in which unit."""
+"""Labels and units of all variables of all datasets."""
 
 from __future__ import annotations
 

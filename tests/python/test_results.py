@@ -1,4 +1,4 @@
-"""What Python calls add to a result: numbers by name, progress, pictures and files."""
+"""Additions of the Python interface to a result: numbers by name, progress, pictures and files."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def test_a_kill_at_any_moment(makers: int, swaps: bool, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("swaps", "renamed"), [(True, 1), (False, 1), (False, 2), (False, 3)])
 def test_a_kill_after_each_step(swaps: bool, renamed: int, tmp_path: Path) -> None:
-    """Where folders can be swapped there is no moment without a whole set; elsewhere the next run finds one."""
+    """Check that a kill leaves a whole set if folders can be swapped, else that the next run restores one."""
     folder = tmp_path / "set"
     make(folder, "4")
     once = MAKER.replace("itertools.count(first)", "[first]")

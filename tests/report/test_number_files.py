@@ -274,7 +274,7 @@ def test_a_workbook_that_cannot_be_written_is_an_error_of_files(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_indicator_diagrams_enclose_the_work_of_the_gas() -> None:
-    """What the forces on the rods do over a turn is what the torque of the gas does."""
+    """Compare the work of rod forces over a turn with that of the gas torque."""
     result = evaluate_only(load(PROBLEMS / "waterworks-steam-pump.toml"))
     sheet = number_tables(result)["indicator"]
     stroke = {part.name: part.stroke for part in result.final.engine.slider_cranks}

@@ -27,7 +27,7 @@ def saved(result: Result, folder: Path, series: bool = False) -> laufruhe.SavedR
 
 
 def fields(thing: object) -> str:
-    """As text: what is no number equals itself there."""
+    """Return the text of an object, in which NaN equals itself."""
     return repr(thing)
 
 

@@ -19,7 +19,7 @@ VOID = {"meta", "img", "br", "link"}
 
 
 class _Page(HTMLParser):
-    """What is on a page; an element that is not closed is an error."""
+    """Elements and words of a page; an element that is not closed is an error."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -95,7 +95,7 @@ def test_light_dark_and_paper_are_provided_for(page: _Page) -> None:
 
 
 def test_both_pages_say_the_same() -> None:
-    """Every cell and sentence of the Markdown page is on the other."""
+    """Check that every cell and sentence of the Markdown page is on the web page."""
     result = scenes.solved(scenes.TIGHT)
     document = result_document(result, [], "laufruhe solve scene.toml")
     words = " ".join(" ".join(_Page(as_html(document, {})).words).split())

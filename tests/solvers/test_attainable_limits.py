@@ -1,4 +1,4 @@
-"""What limits that no design keeps can reach (P16), against grids of designs, every star, and edges beside them."""
+"""Attainable values of limits that no design keeps (P16), compared with grids of designs, every star, and edges."""
 
 from __future__ import annotations
 
@@ -241,7 +241,7 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
 
 
 def told_of(problem: Problem, status: Status, seconds: float | None = None) -> Result:
-    """What is told of a problem that a method says so of, whether that is so or not."""
+    """Return the result with attainable limits, as if a method had ended with this status."""
     found = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
     with limit_time(seconds):
         return with_attainable_limits(found, problem, {Kind.UNBALANCE}, 1.0, solve)
@@ -279,7 +279,7 @@ def test_nothing_is_looked_at_when_time_is_over() -> None:
 
 
 class Clock:
-    """Of the budget: moves where it is told to alone."""
+    """Clock of the budget that moves only by hand."""
 
     now = 0.0
 

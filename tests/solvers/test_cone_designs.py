@@ -23,7 +23,7 @@ from laufruhe.solvers.cones.unbalances import allowed_optimum
 
 
 def test_a_peak_between_angles_keeps_its_limit() -> None:
-    """At 48 angles the program alone breaks its limit between them; what is told does not, and costs hardly more."""
+    """Check that the design keeps its limit between 48 angles, where the program alone breaks it, at little cost."""
     table = {
         "title": "twin", "fidelity": {"samples": 48},
         "engine": {"layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.3,

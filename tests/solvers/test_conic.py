@@ -112,7 +112,7 @@ def test_limits_and_their_prices() -> None:
 
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e6])
 def test_the_size_of_the_weights_changes_nothing(factor: float, tmp_path: Path) -> None:
-    """Under a limit that holds: the same design, its bound and the price of the limit in the unit of the sum."""
+    """Check that a factor on all weights leaves the design, and scales bound and price of the limit."""
     problem = loaded(tmp_path, scenes.TIGHT)
     program = AffineModel(problem).at(72)
     weighted = replace(program, terms=tuple((factor * weight, norm) for weight, norm in program.terms))
@@ -166,7 +166,7 @@ def test_a_solver_that_gives_up_is_not_the_end(status: str, monkeypatch: pytest.
 
 
 def test_tolerances_out_of_reach_are_not_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the solver stalls before its tight tolerances, its own are tried; the design is judged as ever."""
+    """Check that a solver that stalls before tight tolerances tries its own."""
     problem = limited(0.5)
     result = solve(problem)
     monkeypatch.setattr(conic, "ATTEMPTS", (dict.fromkeys(TIGHT, 1e-300), *conic.ATTEMPTS[1:]))

@@ -61,7 +61,7 @@ def mounted() -> dict[str, Any]:
 
 
 def test_few_angles_forbid_what_the_cycle_allows() -> None:
-    """Of the problem below: a force that is kept over the cycle, and at no 48 angles."""
+    """Check that a limit on a force is infeasible at 48 angles and kept at 5760."""
     model = AffineModel(single(QUIET))
     assert is_infeasible(model.at(48))
     fine = model.at(5760)
@@ -146,7 +146,7 @@ def test_a_design_is_none_where_few_angles_alone_allow_it(samples: int, maximum:
 
 
 def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -> None:
-    """Of a search that found none: the nearest design is read at many angles, and breaks its limit."""
+    """Check that the nearest design is read at many angles, where it breaks its limit."""
     problem = out_of_reach()
     failed = replace(solve(problem), status=Status.FAILED, conflict=())
     met: list[bool] = []
@@ -186,7 +186,7 @@ def test_stars_are_not_excluded_by_means_at_the_few_angles_of_a_program() -> Non
 
 
 def test_a_limit_that_nothing_open_moves_is_read_at_many_angles() -> None:
-    """What a cylinder shakes with is no matter of its mounts; 48 angles have a quarter of a percent more of it."""
+    """Check a limit on shaking force, of which 48 angles read a quarter of a percent too much."""
     tables = {
         **SINGLE, **mounted(), "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [],
         "objective": {"minimise": "rms mount force"},

@@ -108,7 +108,7 @@ GRIDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("minimise", "settings"), GRIDS)
 def test_a_grid_shows_the_same(minimise: str, settings: dict[str, Any]) -> None:
-    """All between the ends is as good; and where none is told, no two designs far apart are."""
+    """Check by a grid of 41 masses that all between the free ends are optimal, and no other distant pair."""
     problem = problem_of(minimise, [web("web", "4 kg")], **settings)
     result = laufruhe.solve(problem)
     best, masses = result.objective.value, np.linspace(0.0, 4.0, 41)
@@ -128,7 +128,7 @@ READY = ("twin-parallel-180", "tractor-three-bearings")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READY)
 def test_with_a_free_decision_held_the_optimum_is_as_good(name: str) -> None:
-    """Of ready problems, at both ends and between them; beside limits on peaks, and in the plane."""
+    """Check that the optimum stays as good with a free decision held at both ends and between."""
     problem = load(PROBLEMS / f"{name}.toml")
     result = laufruhe.solve(problem)
     found = [free_decision for free_decision in result.free if not free_decision.name.endswith(".angle")]
@@ -144,7 +144,7 @@ def test_with_a_free_decision_held_the_optimum_is_as_good(name: str) -> None:
 
 
 def holding(problem: Problem, k: int, size: float) -> Problem:
-    """One decision at a size: in the plane no larger, and where the optimum has it, no smaller either."""
+    """Return the problem with one decision at a size, in the plane at most this size."""
     decision = problem.decisions[k]
     own = decision.set.within(size) if decision.set.width > 1 else Interval(size, size, decision.set.angle)
     decisions = (*problem.decisions[:k], replace(decision, set=own), *problem.decisions[k + 1 :])
@@ -198,7 +198,7 @@ def test_a_large_residual_of_the_conditions_is_no_percentage() -> None:
 
 
 def test_a_free_angle_runs_from_the_first_to_the_last_of_its_designs() -> None:
-    """Of one size, at 0.5 rad and up to 0.4 rad to either side."""
+    """Check the range of the angle for three designs at 0.2, 0.5 and 0.9 rad."""
     table = {"title": "one weight", "engine": ENGINE, "operating_points": [{"speed": "1000 rpm"}],
              "counterweights": [{"name": "web", "x": "0 mm", "unbalance": {"between": ["0 kg m", "0.1 kg m"]},
                                  "angle": {"between": [0, 360]}}],

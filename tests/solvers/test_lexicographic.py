@@ -88,7 +88,7 @@ def test_each_cancels_the_first_order_and_has_its_own_mass(name: str) -> None:
 
 @pytest.mark.slow
 def test_the_roll_moment_is_that_of_the_masses() -> None:
-    """What stands beside the crank rolls the block: the couple of the road roller's shafts."""
+    """Compare the roll moment with that of the masses, the shafts beside the crank included."""
     for name in ("single-road-roller", "single-bob-weights"):
         wrench = solved(name).final.loads[0].wrench.sample(2 * mm.STEPS)[: mm.STEPS, 3]
         expected = mm.roll(masses_of(name), SPEED)
@@ -160,7 +160,7 @@ def test_a_rank_without_a_proof_has_no_bound(tmp_path: Path) -> None:
 
 
 def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None:
-    """Of |f - U| and U: within 2 % of the least force as much less mass as that leaves, by a scan."""
+    """Compare the least mass within 2 % of the least force with a scan of 4001 masses."""
     result = solve(loaded(tmp_path, changed(TWO, 'shaking force"\n', 'shaking force"\nwithin = 0.02\n')))
     masses = np.linspace(0.0, 8.0, 4001)
     pin = mm.crank_pin(RADIUS)

@@ -61,7 +61,7 @@ def scene(seed: int, names: tuple[str, ...] = ("mean",), upper: float = 3.0, cou
 
 
 def with_mass(problem: AffineProblem, seed: int, share: float) -> AffineProblem:
-    """With a limit on masses at a share of those of the optimum without."""
+    """Return the problem with a limit on masses at a share of those of its optimum."""
     norm = masses(np.random.default_rng(seed), problem.size)
     free = newton_solution(problem)
     assert free is not None
@@ -69,7 +69,7 @@ def with_mass(problem: AffineProblem, seed: int, share: float) -> AffineProblem:
 
 
 def with_load(problem: AffineProblem, seed: int, *names: str) -> AffineProblem:
-    """With limits on other loads, under what they are at the optimum without."""
+    """Return the problem with limits on other loads at 97 % of those of its optimum."""
     rng = np.random.default_rng(100 + seed)
     free = newton_solution(problem)
     assert free is not None

@@ -77,7 +77,7 @@ def test_no_later_stage_is_begun_after_the_time():
 
 
 def test_where_a_start_is_at_an_optimum_is_told_by_its_residual_not_by_the_solver():
-    """One iteration less than the solver's own tolerance takes ends at the same point."""
+    """Check that a start one iteration short of the solver's tolerance counts by its residual."""
     whole = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])])[0]
     cut = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])], max_iterations=whole.iterations - 1)[0]
     assert cut.iterations < whole.iterations
@@ -102,7 +102,7 @@ def test_where_a_start_is_at_an_optimum_is_told_by_its_residual_not_by_the_solve
     ],
 )
 def test_the_residual_by_hand(gradient, multiplier, bounds, constraint, residual):
-    """Of f + 3 g at (0, 1/4), 0 <= y <= 1, whose one constraint has the slopes (2, 1) and no lower side (N2)."""
+    """Compare the residual of f + 3 g at (0, 1/4) with one constraint of slopes (2, 1) with hand values (N2)."""
     sides = np.array([0.0, 0.0]), np.array([1.0, 1.0]), np.array([-np.inf]), np.array([1.0])
     task = Task("", *sides, np.ones(2), 1.0, ((),), 1, 1.0, False)
     point, slopes = np.array([0.0, 0.25]), np.array([[2.0, 1.0]])
@@ -188,7 +188,7 @@ def waves(softness: float = 0.0) -> NonlinearProgram:
 
 
 def test_of_starts_with_one_end_one_goes_on_and_no_better_optimum_is_lost():
-    """What stays in the first stage is worse there than the best at last, and is under what it would come to."""
+    """Check that starts left in the first stage end no better than the best optimum."""
     starts = spread_starts(np.array([-4.0]), np.array([4.0]), 24)
     found = solve_nonlinear(waves(0.3), starts, workers=1, stop_when=lambda optima: False)
     alone = [solve_nonlinear(waves(0.3), [start], workers=1)[0] for start in starts]
@@ -223,7 +223,7 @@ def test_what_follows_from_the_rest_tells_no_ends_apart():
 
 
 def test_a_search_ends_when_nothing_better_is_to_be_expected():
-    """By the rule of Boender and Rinnooy Kan: seven starts where there is one optimum, more where there are several."""
+    """Check the rule of Boender and Rinnooy Kan: seven starts for one optimum, more for several."""
     x = ca.SX.sym("x", 1)
     bowl = NonlinearProgram(x, (x[0] - 0.3) ** 2, np.array([-4.0]), np.array([4.0]))
     starts = spread_starts(np.array([-4.0]), np.array([4.0]), 60)

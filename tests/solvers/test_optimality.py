@@ -279,7 +279,7 @@ def test_scaling_masses_and_speed_scales_the_optimum() -> None:
 
 
 def test_brute_force_over_size_and_angle() -> None:
-    """One shaft, a grid over its disc and its sector: nothing on it is better."""
+    """Check by a grid over disc and sector of one shaft that no design is better."""
     rotors = [shaft_rotor("shaft", -1, 0.1, 0.1, 0.0)]
     machine = engine([0.0, 180.0], rotors, firing_order=[1, 2])
     for low, high in ((0.0, math.tau), (0.2, 1.2)):

@@ -185,7 +185,7 @@ def test_what_no_method_knows_is_searched(text: str, tmp_path: Path) -> None:
 
 
 def test_an_open_crank_beside_its_pistons_is_decided_star_by_star(tmp_path: Path) -> None:
-    """As well as with each even crank given."""
+    """Compare an open crank with open piston masses with each even crank given."""
     text = """
 title = "Four in line"
 [engine]

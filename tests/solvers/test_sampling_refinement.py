@@ -1,4 +1,4 @@
-"""What few angles read of a mean is no verdict, whichever method decides: sizes, leads, throws, built engines (P7)."""
+"""Means at few angles, which decide no result: sizes, leads, throws, built engines (P7)."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> N
 
 
 def test_a_program_in_which_nothing_is_open_is_its_own_answer() -> None:
-    """As of a box of throws that is one point: its rows tell all, and no solver is asked."""
+    """Check the bound of a program without open numbers, as of a box of one point."""
     model = AffineModel(problem({}, objective={"minimise": "rms shaking force"})).at(48)
     found = solve_cones(model)
     assert found.x is not None

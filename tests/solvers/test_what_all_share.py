@@ -1,4 +1,4 @@
-"""What holds whichever method decides: limits that nothing open acts on, and no design worse than the one given."""
+"""Rules of every method: limits that no open number changes, and no design worse than the initial one."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ print(laufruhe.solve(sys.argv[1]).status)
 
 @pytest.mark.slow
 def test_counterweights_and_shafts_are_decided_with_no_library_but_the_solver_of_cones() -> None:
-    """None of the others is imported: each would take longer than the design."""
+    """Check that a solve imports no heavy library except the cone solver."""
     path = str(PROBLEMS / "tractor-four-lanchester.toml")
     found = subprocess.run([sys.executable, "-c", QUICK, path], check=True, capture_output=True, text=True)
     assert found.stdout == "optimal\n"

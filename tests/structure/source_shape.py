@@ -1,7 +1,7 @@
-"""What the source is made of, measured on its syntax: imports, circles, chains of questions.
+"""Shape of the source, measured on its syntax: imports, circles, chains of questions.
 
-Every measure is a set of names of what breaks a rule. `python tests/structure/source_shape.py` prints them, and
-with `--prune` takes out of `exceptions.toml` what no longer breaks its rule (it never adds one).
+Every measure is a set of names that break a rule. `python tests/structure/source_shape.py` prints them; `--prune`
+removes from `exceptions.toml` the names that no longer break their rule, and never adds one.
 """
 
 import ast
@@ -79,7 +79,7 @@ def inside(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def functions(tree: ast.AST, prefix: str = "") -> Iterator[tuple[str, Function]]:
-    """Every function with its dotted name inside the module, those of classes and of functions too."""
+    """Yield every function of a tree with its dotted name, those of classes and functions included."""
     for node in inside(tree):
         if isinstance(node, Function | ast.ClassDef):
             name = f"{prefix}{node.name}"
@@ -102,7 +102,7 @@ def imported(node: ast.AST, module: str, known: Trees) -> set[str]:
 
 
 def run_nodes(tree: ast.AST) -> Iterator[ast.AST]:
-    """Every statement but those that only a type checker reads."""
+    """Yield every statement except those that only a type checker reads."""
     for node in inside(tree):
         if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):
             yield node
@@ -197,7 +197,7 @@ def late_imports(known: Trees) -> set[str]:
 
 @cache
 def operands(tree: ast.Module) -> tuple[ast.expr, ...]:
-    """What comparisons, patterns and `isinstance` ask for, tuples taken apart."""
+    """Return the operands of comparisons, patterns and `isinstance`, each member of a tuple by itself."""
     found: list[ast.expr] = []
     for node in ast.walk(tree):
         compared: list[ast.expr] = []
@@ -248,7 +248,7 @@ def questions_of_layout(known: Trees) -> set[str]:
 
 
 def measured() -> dict[str, set[str]]:
-    """What breaks each rule today."""
+    """Return the names that break each rule."""
     known = trees()
     return {
         "late_imports": late_imports(known),
@@ -270,7 +270,7 @@ def written(table: dict[str, set[str]]) -> str:
 
 
 def still_allowed(name: str, allowed: set[str]) -> bool:
-    """Whether an exception covers `name`; a count may only fall."""
+    """Return whether an exception covers a name; a count may only fall."""
     module, _, count = name.partition(": ")
     if not count:
         return name in allowed

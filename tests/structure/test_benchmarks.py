@@ -36,7 +36,7 @@ def test_scripts_can_be_imported_and_a_study_too_small_to_tell_growth_is_refused
 
 @pytest.mark.slow
 def test_one_after_the_other_whatever_becomes_of_them(tmp_path: Path):
-    """What fails or takes too long is told, and those after it are run."""
+    """Check that a benchmark that fails or exceeds its time is named, and that those after it run."""
     for name, (text, _) in SHORT.items():
         (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
     scripts = {name: tmp_path / f"{name}.py" for name in SHORT}

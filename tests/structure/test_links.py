@@ -1,4 +1,4 @@
-"""Every link of the pages leads to a file that is kept, and to a heading that is there."""
+"""Links of the pages, which must lead to existing files and headings."""
 
 import re
 from pathlib import Path

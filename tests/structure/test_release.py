@@ -1,4 +1,4 @@
-"""What a release says of itself agrees everywhere, and a wheel carries all that its user needs."""
+"""Version and files of a release, which must agree, and the data of its wheel."""
 
 from __future__ import annotations
 

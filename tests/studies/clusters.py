@@ -59,7 +59,7 @@ TIMED = "## Where the time went"
 
 
 def environment() -> dict[str, str]:
-    """Of every process: one thread each, the package under test, and patience with a slow machine."""
+    """Return the environment of every process: one thread each, the package under test, long waits."""
     return {**os.environ, **_THREADS, **_PATIENT, "PYTHONPATH": _SOURCE}
 
 
@@ -86,7 +86,7 @@ class Cluster:
 
     @property
     def address(self) -> str:
-        """Of the scheduler."""
+        """Return the address of the scheduler."""
         return f"tcp://127.0.0.1:{self.port}"
 
     def start(self, count: int) -> None:
@@ -97,17 +97,17 @@ class Cluster:
             self.add()
 
     def add(self) -> None:
-        """One more worker."""
+        """Start one more worker."""
         self.workers.append(self._process("worker", self.address, "--no-nanny", *EACH))
 
     def kill_worker(self, which: int) -> None:
-        """One worker, by SIGKILL."""
+        """Kill one worker by SIGKILL."""
         worker = self.workers.pop(which)
         worker.kill()
         worker.wait()
 
     def processor_time(self) -> float:
-        """Of all workers so far [s]."""
+        """Return the processor time of all workers so far [s]."""
         import psutil
 
         return sum(sum(psutil.Process(worker.pid).cpu_times()[:2]) for worker in self.workers)
@@ -168,7 +168,7 @@ def finished(folder: Path, *words: str) -> str:
 
 
 def results(folder: Path) -> dict[str, bytes]:
-    """Every file of the results, without what is a matter of time and of the command."""
+    """Return every file of the results without its times and its command."""
     found = {path.name: path.read_bytes() for path in (folder / "out").iterdir() if path.is_file()}
     for page in ("report.md", "report.html"):
         found[page] = found[page].partition(b"Made by")[0]

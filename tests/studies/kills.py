@@ -73,7 +73,7 @@ def started(folder: Path, jobs: int = 1) -> subprocess.Popen[str]:
 
 
 def results(folder: Path) -> dict[str, bytes]:
-    """Every file of the results, without what is a matter of time."""
+    """Return every file of the results without its times."""
     found = {path.name: path.read_bytes() for path in (folder / "out").iterdir() if path.is_file()}
     # the page has it in its list of sections first
     found["report.html"] = found.get("report.html", b"").rpartition(TIMED.lstrip("# ").encode())[0]
@@ -118,7 +118,7 @@ class Whole:
 
 
 def uninterrupted(folder: Path) -> Whole:
-    """One run in a new folder, left alone."""
+    """Return the results of one run in a new folder."""
     began = time.monotonic()
     process = started(prepared(folder))
     while not (folder / "out" / FINISHED_POINTS).exists() and process.poll() is None:
@@ -131,14 +131,14 @@ def uninterrupted(folder: Path) -> Whole:
 
 @dataclass
 class Log:
-    """What was tried, and what went wrong."""
+    """Counts of what was tried, and lines about what went wrong."""
 
     tried: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
 
 
 def attacked(folder: Path, seed: int, whole: Whole, log: Log) -> None:
-    """One study in a new folder: killed up to four times, its kept points damaged, then left alone."""
+    """Run one study in a new folder: kill it up to four times, damage its points, then let it end."""
     rng = random.Random(seed)
     shutil.rmtree(folder, ignore_errors=True)
     prepared(folder)

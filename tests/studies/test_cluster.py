@@ -20,7 +20,7 @@ KILLED_AT = 6
 
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One process, left alone."""
+    """Return the folder of a study that one process computed."""
     folder = clusters.prepared(tmp_path_factory.mktemp("serial"), **SMALL)
     with chdir(folder):
         answer = CliRunner().invoke(app, ["study", "s.toml", "--out", "out", "--jobs", "1"])

@@ -38,7 +38,7 @@ def written(path: Path, count: int = 5) -> bytes:
 
 
 def trusted(path: Path) -> list[int]:
-    """Which points are taken from a file; each as it was kept, or the test fails."""
+    """Return the points that a file gives, after a check that each is as written."""
     with FinishedPoints(path, MARKS) as store:
         for mark, record in ((mark, store.read(mark)) for mark in store.seconds):
             whole = RECORDS[MARKS.index(mark)]
@@ -98,7 +98,7 @@ def test_what_is_no_point_is_passed_over(tmp_path: Path, content: bytes) -> None
 
 
 def test_two_at_once_keep_whole_lines(tmp_path: Path) -> None:
-    """One that found the end of the file before the other added to it."""
+    """Check that two writers of one file leave whole lines."""
     path = tmp_path / FINISHED_POINTS
     with FinishedPoints(path, MARKS) as one, FinishedPoints(path, MARKS) as other:
         for k in range(5):

@@ -50,7 +50,7 @@ def put(tables: dict[str, Any], path: str, value: Any) -> None:
 
 
 def sweeps_of(tables: dict[str, Any]) -> dict[str, Any]:
-    """What of a problem may be swept: numbers of engine, gas, mounts, points and limits, none of them open."""
+    """Return the closed numbers of engine, gas, mounts, points and limits that may be swept."""
     found: dict[str, Any] = {}
     for table in ("engine", "gas", "mounts", "block"):
         for key, value in tables.get(table, {}).items():
@@ -79,7 +79,7 @@ def swept(rng: random.Random, path: str, value: str) -> dict[str, Any]:
 
 
 def fits(kind: str, tables: dict[str, Any]) -> bool:
-    """Whether a kind means something for a problem."""
+    """Return whether a kind of study applies to a problem."""
     closed = "phasing" not in tables and tables["engine"].get("throws") != "open"
     if kind in ("counterweight fraction", "balancer sizing") and not closed:
         return False
@@ -153,7 +153,7 @@ def test_a_random_study_is_computed_told_and_drawn(seed: int, tmp_path: Path) ->
 
 
 def check_a_point(part: dict[str, Any], data: dict[str, Any], rng: random.Random, folder: Path) -> None:
-    """One row of a sweep beside its problem changed by hand and solved."""
+    """Compare one row of a sweep with the solve of its problem, changed by hand."""
     coords = {name: one["data"] for name, one in data["coords"].items()}
     row = rng.randrange(len(coords["case"]))
     if "shafts" in coords:

@@ -40,7 +40,7 @@ def problem(name: str, cylinders: int, **more: Any) -> Problem:
 
 @pytest.mark.slow
 def test_an_open_crank_is_decided_in_its_new_size() -> None:
-    """Of similar engines forces go as one over the number of cylinders (eq. 23), whichever crank is best."""
+    """Check that forces of similar engines go as one over the number of cylinders (eq. 23)."""
     drawn = problem("inline", 3, objective=FORCE)
     rebuilt = at_equal_power(drawn, 4)
     assert rebuilt.phasing is not None

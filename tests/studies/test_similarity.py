@@ -44,7 +44,7 @@ class TestLaws:
 
     @given(COUNTS, COUNTS, COUNTS)
     def test_a_chain_of_engines(self, a: int, b: int, c: int) -> None:
-        """From a to c by way of b is from a to c, and from an engine to itself nothing changes."""
+        """Check that the scale from a to b times b to c is that from a to c, and of a to a is one."""
         one, two, both = equal_power_scale(a, b), equal_power_scale(b, c), equal_power_scale(a, c)
         assert np.multiply(astuple(one), astuple(two)) == pytest.approx(astuple(both))
         assert equal_power_scale(a, a) == EqualPowerScale(1.0, 1.0, 1.0)

@@ -210,7 +210,7 @@ def test_designs_are_ranked_by_further_quantities(tmp_path: Path) -> None:
 
 
 def test_an_engine_without_a_further_quantity_says_why(tmp_path: Path, small: Path) -> None:
-    """One of two engines has main bearings; the other has a reason in its cell."""
+    """Check the reason in the cell of the engine without main bearings."""
     folder = tmp_path / "problems"
     shutil.copytree(small, folder)
     text = (folder / "single.toml").read_text(encoding="utf-8")
@@ -310,7 +310,7 @@ def pool_at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_progress_says_how_long_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of what this run has done, not of what was kept; and not more often than can be read."""
+    """Check that the time left counts the points of this run alone, and that lines are rare."""
     now, said = [0.0], []
     monkeypatch.setattr(cli_study.time, "perf_counter", lambda: now[0])
     tell = cli_study._Progress(said.append)

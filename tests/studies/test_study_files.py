@@ -303,7 +303,7 @@ READ = """readings = { "as printed" = { "engine.reciprocating_mass" = "1.25 kg" 
 
 
 def test_a_part_is_read_in_every_reading(tmp_path: Path) -> None:
-    """One part each, its value set in all cases; what a case sets itself stands."""
+    """Check one part for each reading, with its value in all cases that do not set their own."""
     path = tmp_path / "s.toml"
     own = case("own", str(FOUR), 'set = { "engine.reciprocating_mass" = "3 kg" }')
     path.write_text(study("layout comparison", more=READ) + own, encoding="utf-8")
@@ -335,7 +335,7 @@ def test_a_table_may_replace_a_number_of_all_parts(tmp_path: Path) -> None:
 
 
 def test_every_bad_expression_is_told_by_its_place(tmp_path: Path) -> None:
-    """One line each: key, what stands there, the rule and the nearest name."""
+    """Check one line for each bad expression: key, value, rule and nearest name."""
     panel = 'picture = { panels = [{ title = "{m:d}", curves = [{ y = "mean[\'givn\'] / m" }] }] }\nquantities'
     path = tmp_path / "s.toml"
     path.write_text(REPLICA.replace("quantities", panel).replace("is = 1", 'is = "2 * mm"'), encoding="utf-8")

@@ -35,7 +35,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Entry:
-    """One extreme: what is guaranteed, and the worst that was measured.
+    """Extreme case: its guarantee and the worst measured error.
 
     Attributes
     ----------
@@ -314,7 +314,7 @@ def _bounded(big: float, small: float) -> tuple[float, float]:
 
 
 def no_damping_near_resonance() -> Entry:
-    """One mass on four springs without loss, driven at 1e-1 to 1e-7 beside its natural frequency, both sides."""
+    """Return the error of one mass on four springs, driven at 1e-1 to 1e-7 from resonance, both sides."""
     import mpmath
 
     errors = []

@@ -169,7 +169,7 @@ class Loads:
 
 @dataclass(frozen=True)
 class Integrator:
-    """How the generalised-alpha method solves its steps.
+    """Settings of Newton's method in the generalised-alpha method.
 
     Attributes
     ----------
@@ -434,7 +434,7 @@ def _reactions(model: _Model, torques: list[tuple[float, FloatArray]], steps: sl
 
 
 def _momentum(model: _Model, torques: list[tuple[float, FloatArray]], steps: slice) -> FloatArray:
-    """What block and flywheel give the bodies in momentum, less the flywheel's torque, turned round."""
+    """Return the negative rate of momentum of the bodies from block and flywheel, less the flywheel's torque."""
     total = np.zeros((steps.stop - steps.start, 6))
     for body in model.bodies:
         force = -body.mass * _plane(model, body.acceleration, steps)

@@ -1,4 +1,4 @@
-"""Every entry of results/benchmarks/extremes.md keeps its guarantee."""
+"""Guarantees of all entries of results/benchmarks/extremes.md."""
 
 from __future__ import annotations
 

@@ -259,7 +259,7 @@ def error(name: str, got: FloatArray, expected: FloatArray) -> float:
 
 
 def own_error(name: str) -> float:
-    """Of the finer simulation, from the two alone."""
+    """Return the error of the finer simulation, estimated from the two alone."""
     return error(name, simulated(name, COARSE).reactions, simulated(name, FINE).reactions[::2]) / 3.0
 
 

@@ -230,7 +230,7 @@ def carried(engine: Engine) -> Engine:
 
 
 def test_rods_on_one_pin_press_it_as_hinged_ones_close_to_it(tmp_path: Path) -> None:
-    """What reaches the crank goes to that of rods side by side on the pin as the knuckle pins come to it."""
+    """Compare bearing forces of rods on one pin with those of knuckle pins very close to it."""
     found = []
     for radius in ("0 mm", "1e-3 mm"):
         engine = loaded(tmp_path, TEXT.replace('knuckle_radius = "50 mm"', f'knuckle_radius = "{radius}"')).engine

@@ -1,4 +1,4 @@
-"""What this package adds to laufruhe."""
+"""Additions of this package to laufruhe."""
 
 from laufruhe.extension import Extension
 
