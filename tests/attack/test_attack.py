@@ -67,7 +67,7 @@ def complaints(table: Table, result: Any) -> str:
     return " ".join(verdict.wrong)
 
 
-def test_what_is_true_is_not_complained_of(example: tuple[Table, Result]) -> None:
+def test_true_claims_raise_no_complaint(example: tuple[Table, Result]) -> None:
     assert complaints(*example) == ""
 
 

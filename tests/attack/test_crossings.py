@@ -50,7 +50,7 @@ def solution(family: str) -> tuple[Table, Result]:
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["pistons and stars", "ranks with limits"])
 @pytest.mark.parametrize(("change", "is_true"), [(raised, False), (lambda result: result, True)], ids=["lie", "truth"])
-def test_only_a_lie_is_heard(family: str, change: Callable[[Any], Any], is_true: bool) -> None:
+def test_only_a_false_claim_is_reported(family: str, change: Callable[[Any], Any], is_true: bool) -> None:
     table, result = solution(family)
     verdict = Verdict(family, SEEDS.get(family, SEED))
     judge(verdict, table, change(result), np.random.default_rng(0), 1)

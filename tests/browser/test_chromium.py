@@ -65,7 +65,7 @@ def test_axe_finds_what_cannot_be_read(page: Page) -> None:
     assert serious(page) == []
 
 
-def test_a_machine_without_chromium_is_told_what_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_missing_chromium_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv(chromium.CHOSEN, raising=False)
     assert chromium.executable() is None

@@ -55,7 +55,7 @@ def printed(problem: Problem, found: Evaluation, names: Collection[str]) -> dict
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_what_is_shown_is_what_evaluate_prints(name: str, page: Page, tmp_path: Path) -> None:
+def test_the_page_shows_the_numbers_of_evaluate(name: str, page: Page, tmp_path: Path) -> None:
     problem = problem_of(name)
     model = model_of(problem)
     page.goto(page_of(problem, tmp_path).as_uri())

@@ -129,7 +129,7 @@ def test_a_term_that_no_closing_method_knows_takes_its_own_share_alone(problem: 
 
 
 @pytest.mark.slow
-def test_a_bound_of_nothing_is_told_as_none(problem: Problem) -> None:
+def test_a_useless_bound_is_reported_as_none(problem: Problem) -> None:
     found = laufruhe.solve(problem)
     assert found.certificate is not None
     empty = replace(found, certificate=replace(found.certificate, kind=Proof.WITHIN_GAP, lower_bound=0.0, gap=1.0))

@@ -41,7 +41,7 @@ def test_a_first_objective_that_cancels_is_zero() -> None:
 
 
 @pytest.mark.parametrize("seed", first_fast(range(4), 0, 2))
-def test_what_cancels_is_global_wherever_it_stands(seed: int) -> None:
+def test_a_cancelled_order_is_proven_at_any_rank(seed: int) -> None:
     """A crank's first order against two shafts, as the first of two objectives or alone."""
     rng = np.random.default_rng(seed)
     table = tomllib.loads((INPUTS / "ranks-with-a-zero.toml").read_text())

@@ -77,7 +77,7 @@ def test_every_file_that_a_scene_names_counts(tables: dict[str, object], tmp_pat
     assert len({absent, first, changed}) == 3
 
 
-def test_which_of_two_files_it_is_counts(tmp_path: Path) -> None:
+def test_the_content_of_each_file_is_in_the_fingerprint(tmp_path: Path) -> None:
     point = Point(CaseTable(name="a", problem="a.toml"), base={"gas": {"files": ["a.csv", "b.csv"]}})
     (tmp_path / "a.csv").write_text("1,2\n", encoding="utf-8")
     first = ProblemFiles(tmp_path).fingerprint(point, {})
@@ -92,9 +92,7 @@ def test_texts_that_name_no_file_do_no_harm(text: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_file_that_changes_under_way_is_told_and_nothing_of_it_kept(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_changes_during_a_run_is_an_error(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     solved = runner._answer
 
     def changed_meanwhile(*words: object) -> runner.Answer:

@@ -136,7 +136,7 @@ def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
     assert not any(star.proven for star in found.phasing.ranking)
 
 
-def test_throws_are_walked_from_the_star_that_is_told_and_from_no_other() -> None:
+def test_throws_are_walked_from_the_best_star_only() -> None:
     """Move every throw and angle of the best star, and exchange its cranks; without a star move nothing."""
     problem = load(PROBLEMS / "inline-seven-uneven.toml")
     assert problem.phasing is not None
@@ -220,7 +220,7 @@ def claims_no_more_than(result: Result, value: float) -> bool:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("transmitted")
-def test_what_is_wrongly_taken_for_a_constant_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_channel_declared_constant_by_mistake_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     """A channel that is said not to be on the mounts, while their stiffness is open."""
     names = ("mount force", "mount travel")
     monkeypatch.setattr(Measure, "on_mounts", property(lambda self: self.is_load and self.load.name in names))

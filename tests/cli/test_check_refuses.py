@@ -43,7 +43,7 @@ def test_check_and_solve_refuse_alike(rule: str, tmp_path: Path) -> None:
         ('stroke = "120 mm"', 'stroke = { between = ["100 mm", "120 mm"] }'),
     ],
 )
-def test_what_no_method_knows_together_has_a_method(change: tuple[str, str]) -> None:
+def test_every_accepted_problem_has_a_method(change: tuple[str, str]) -> None:
     problem: Problem = laufruhe.load(changed(HEIGHTS, *change))
     refuse(problem)
     assert any(method.suits(problem) for method in METHODS)

@@ -175,7 +175,7 @@ def test_solve_and_evaluate_have_places_of_their_own(here: Path) -> None:
     refused(run("evaluate", path, "--out", "results/scene"), "--out", "holds the results of laufruhe solve")
 
 
-def test_what_others_made_is_never_touched(here: Path) -> None:
+def test_files_of_others_are_never_overwritten(here: Path) -> None:
     path = written(here, scenes.TIGHT)
     (here / "mine").mkdir()
     (here / "mine/report.md").write_text("mine")
@@ -317,7 +317,7 @@ def test_help_imports_no_heavy_library() -> None:
 
 
 @pytest.mark.parametrize(("given", "threads"), [({}, ["1"] * 3), ({"OPENBLAS_NUM_THREADS": "2"}, ["2"])])
-def test_linear_algebra_of_a_command_takes_one_thread_unless_told(given: dict[str, str], threads: list[str]) -> None:
+def test_linear_algebra_of_a_command_takes_one_thread_by_default(given: dict[str, str], threads: list[str]) -> None:
     """Said before NumPy reads it, by the command alone: who imports the package keeps what the environment says."""
     code = (
         "import os, sys\n"

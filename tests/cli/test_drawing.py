@@ -33,7 +33,7 @@ def test_by_whom_a_picture_is_drawn_cannot_be_seen(tmp_path: Path, monkeypatch: 
     assert {"star.png", "firings.png"} <= set(here)
 
 
-def test_what_cannot_be_told_to_another_process_is_drawn_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_result_that_cannot_be_pickled_is_drawn_in_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = scenes.solved(scenes.SHAKING_ONLY)
     result = replace(result, timing={"none": lambda: None})  # type: ignore[dict-item]
     assert "engine.png" in drawn(result, tmp_path, 1, monkeypatch)

@@ -43,9 +43,7 @@ def started(folder: Path, code: str) -> subprocess.Popen[str]:
     ("code", "number", "message"),
     [(DEAF, signal.SIGTERM, "interrupted\n"), (ASLEEP, signal.SIGINT, "interrupted, nothing was written\n")],
 )
-def test_who_listens_ends_by_itself_and_who_does_not_is_ended(
-    code: str, number: signal.Signals, message: str, tmp_path: Path
-) -> None:
+def test_a_signal_ends_a_process_or_kills_it(code: str, number: signal.Signals, message: str, tmp_path: Path) -> None:
     """Long before either would end: the one counts for days, the other sleeps for hours."""
     running = started(tmp_path, code)
     running.send_signal(number)
@@ -112,7 +110,7 @@ def test_an_interrupt_at_any_moment_is_one_line(code: str, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("end", "said"), [("os.abort()", "signal 6"), ("(_ for _ in ()).throw(MemoryError())", "more memory")]
 )
-def test_an_end_without_warning_is_told(end: str, said: str, tmp_path: Path) -> None:
+def test_a_sudden_end_is_reported(end: str, said: str, tmp_path: Path) -> None:
     running = started(tmp_path, f"import os; import laufruhe.solvers as s; s.solve = lambda *_, **__: {end}\n")
     out, err = running.communicate(timeout=LONG)
     assert running.returncode == 1

@@ -47,7 +47,7 @@ def test_every_command_is_documented() -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
-def test_output_that_nobody_can_take_is_told(here: Path) -> None:
+def test_output_that_cannot_be_written_is_an_error(here: Path) -> None:
     words = [sys.executable, "-m", "laufruhe", "check", str(SINGLE)]
     with Path("/dev/full").open("w") as full:
         found = subprocess.run(words, cwd=here, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
@@ -118,7 +118,7 @@ def test_names_of_files_cannot_command_a_screen(here: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["check", "solve", "evaluate", "study", "explain", "trade"])
-def test_a_file_that_may_not_be_read_is_told_as_any_other_fault(
+def test_a_file_without_permission_is_refused_in_a_line(
     here: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
     """Check that the reader refuses a file without permission in its one line."""
@@ -158,7 +158,7 @@ def test_quiet_and_verbose_contradict_each_other(here: Path) -> None:
     assert "-q: is given beside -v" in found.output
 
 
-def test_every_command_is_told_in_a_line_that_fits() -> None:
+def test_help_describes_every_command_in_one_line() -> None:
     commands = run.invoke(app, ["--help"], env={"COLUMNS": "80"}).output.partition("Commands:")[2]
     assert "trade" in commands
     assert "..." not in commands
@@ -171,7 +171,7 @@ def test_loudness_may_stand_before_the_command(here: Path) -> None:
     assert "ok: " in run.invoke(app, ["check", str(SINGLE)]).output
 
 
-def test_other_options_before_the_command_are_told_where_they_stand(here: Path) -> None:
+def test_options_before_the_command_are_refused_with_a_remedy(here: Path) -> None:
     found = run.invoke(app, ["--json", "found.json", "check", str(SINGLE)])
     assert (found.exit_code, list(here.iterdir())) == (2, [])
     assert (
@@ -230,7 +230,7 @@ def test_progress_shows_value_bound_and_gap_of_the_outermost_search() -> None:
     ]
 
 
-def test_searches_tell_who_listens_and_no_one_else() -> None:
+def test_searches_report_progress_to_their_listener_only() -> None:
     steps: list[Step] = []
     with progress_listener(steps.append), search_scope("outer"):
         report_progress("inner", 1, 2, 3.0, 2.0)
@@ -264,7 +264,7 @@ positions = [["300 mm", "250 mm", "0 mm"], ["300 mm", "-250 mm", "0 mm"], ["-300
 """
 
 
-def test_a_star_search_tells_value_and_bound_that_enclose_the_answer(tmp_path: Path) -> None:
+def test_progress_of_a_star_search_encloses_the_optimum(tmp_path: Path) -> None:
     steps: list[Step] = []
     result = solve(loaded(tmp_path, OPEN_FOUR), steps.append)
     assert result.objective is not None
@@ -276,7 +276,7 @@ def test_a_star_search_tells_value_and_bound_that_enclose_the_answer(tmp_path: P
 
 
 @pytest.mark.parametrize(("kind", "ends"), [("svg", {".svg"}), ("png", {".png"}), ("both", {".svg", ".png"})])
-def test_pictures_come_in_the_format_asked_for(here: Path, kind: str, ends: set[str]) -> None:
+def test_pictures_have_the_chosen_format(here: Path, kind: str, ends: set[str]) -> None:
     assert run.invoke(app, ["evaluate", str(SINGLE), "-q", "--format", kind]).exit_code == 0
     folder = here / "results" / "tractor-single-initial"
     assert {path.suffix for path in folder.glob("bars.*")} == ends
@@ -292,7 +292,7 @@ def test_pictures_come_in_the_format_asked_for(here: Path, kind: str, ends: set[
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("more", "lines"), [([], 1), (["-q"], 0)])
-def test_letters_that_cannot_be_drawn_are_told_in_one_line(more: list[str], lines: int, tmp_path: Path) -> None:
+def test_letters_without_a_font_give_one_warning(more: list[str], lines: int, tmp_path: Path) -> None:
     """Draw once in a process without a backend and with broken settings; hardly any font has Linear A."""
     (tmp_path / "matplotlibrc").write_bytes(b"font.size: nonsense\n\xff\xfe\n")
     path = written(tmp_path, scenes.SHAKING_ONLY.replace('title = "', 'title = "\U00010600 '))

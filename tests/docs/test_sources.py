@@ -34,7 +34,7 @@ def test_every_row_is_held_or_says_why_not(row):
     assert not is_hole or len(row_text) > len("hole: a reason")
 
 
-def test_what_is_not_there_is_found():
+def test_missing_files_and_tests_are_detected():
     assert missing("tests/docs/test_sources.py::test_of_nothing")
     assert missing("src/nothing.py")
-    assert not missing("tests/docs/test_sources.py::test_what_is_not_there_is_found")
+    assert not missing("tests/docs/test_sources.py::test_missing_files_and_tests_are_detected")

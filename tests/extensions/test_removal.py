@@ -118,7 +118,7 @@ def test_nothing_imports_an_extension_of_others_as_it_is_imported() -> None:
 
 
 @pytest.mark.parametrize("name", EXTENSIONS)
-def test_what_others_add_has_its_place_without_it(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_additions_keep_their_order_without_an_extension(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     others = tuple(other for other in extension.extensions() if other.name != name)
     monkeypatch.setattr(extension, "extensions", lambda: others)
     for table, kind, core in ORDERED:

@@ -150,7 +150,7 @@ def test_more_than_any_engine_has(tmp_path: Path) -> None:
     [b"", b"\x00", b"\xff\xfe", b"[" * 3000, b"a = " + b"[" * 3000, b"title = 'x'\n" * 2, b"\xef\xbb\xbf", b"=" * 99,
      b"a = " + b"9" * 9999],
 )  # fmt: skip
-def test_what_is_no_problem_at_all(content: bytes, tmp_path: Path) -> None:
+def test_files_that_are_no_problem_are_refused(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "spoilt.toml"
     path.write_bytes(content)
     answer = CliRunner().invoke(app, ["check", str(path)])

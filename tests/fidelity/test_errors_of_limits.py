@@ -32,7 +32,7 @@ samples = 240
 """
 
 
-def test_error_of_a_mean_with_corners_is_told_and_not_exceeded() -> None:
+def test_the_error_estimate_of_a_mean_with_corners_is_not_exceeded() -> None:
     # 40 samples a turn see |cos(6 phi)| seven times between two zeros; its mean is 2 / pi of the amplitude
     result = laufruhe.evaluate(laufruhe.load(SIX))
     (limit,) = result.limits

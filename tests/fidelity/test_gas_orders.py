@@ -58,7 +58,7 @@ def test_gas_alone_is_cut(seed: int, last: int) -> None:
         np.testing.assert_allclose(first[~above], whole.coefficients[~above], rtol=0.0, atol=1e-13 * scale)
 
 
-def test_uneven_throws_feel_the_orders_that_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_uneven_throws_are_loaded_by_the_kept_orders(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
     monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
     fidelities = Fidelity(samples=720, gas_orders=3), Fidelity(samples=720), Fidelity(samples=720, gas=False)

@@ -115,7 +115,7 @@ def test_no_engine_of_the_catalogue_warns_about_its_order(tmp_path: Path) -> Non
         assert not [warning for warning in warnings if warning.where == "engine.firing_order"], key
 
 
-def test_what_a_problem_says_itself_counts(tmp_path: Path) -> None:
+def test_keys_of_the_problem_override_the_catalogue(tmp_path: Path) -> None:
     given = _problem(tmp_path, "chevrolet-350")
     own = _problem(tmp_path, "chevrolet-350", 'rod_ratio = 0.29\nreciprocating_mass = "1 kg"')
     assert own.engine.cylinders[0].rod_ratio == pytest.approx(0.29)

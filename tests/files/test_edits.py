@@ -159,7 +159,7 @@ def test_more_freedom_is_never_worse(problem: Problem) -> None:
         ("whatever", "1", "is not the name of a number of this problem"),
     ],
 )
-def test_what_is_wrong_is_said_as_for_a_file(problem: Problem, name: str, value: str, line: str) -> None:
+def test_bad_edits_are_refused_as_in_a_file(problem: Problem, name: str, value: str, line: str) -> None:
     with pytest.raises(InputError) as refused:
         problem.with_values({name: value})
     assert line in str(refused.value)
@@ -191,9 +191,7 @@ def test_a_problem_goes_to_another_process(problem: Problem) -> None:
 @pytest.mark.parametrize(("names", "rotor_names"), [
     ([None], ["s"]), (["a"], ["s.a"]), ([None, None], ["s.1", "s.2"]), (["a", None, "b"], ["s.a", "s.2", "s.b"]),
 ])  # fmt: skip
-def test_unbalances_of_a_shaft_have_one_name_wherever_they_are_asked_for(
-    names: list[str | None], rotor_names: list[str]
-) -> None:
+def test_unbalances_of_a_shaft_have_the_same_name_everywhere(names: list[str | None], rotor_names: list[str]) -> None:
     """In results and in edits."""
     tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
     weights = [{"x": f"{10 * k} mm", "unbalance": "0.01 kg m"} for k in range(len(names))]

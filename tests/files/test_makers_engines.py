@@ -119,7 +119,7 @@ def test_an_order_that_does_not_fit_its_crank_names_the_cylinders_out_of_place(k
         ("bad-m104", "cylinders 1 and 6, 2 and 5 are not in step; check the order; with 5 and 6 exchanged it fits"),
     ],
 )
-def test_a_wrong_order_without_throws_is_told_too(key: str, line: str) -> None:
+def test_a_wrong_order_without_throws_is_reported(key: str, line: str) -> None:
     try:
         text = str(typed(key, throws=None).plausibility_warnings[0])
     except InputError as refused:

@@ -251,7 +251,7 @@ FLAT_FOUR = {"layout": "boxer", "bank_stagger": "45 mm", "firing_order": [1, 3, 
 ODD_SIX = {"layout": "vee", "bank_angle": 90, "throws": [0, 120, 240], "firing_order": [1, 6, 5, 4, 3, 2]}
 
 
-def test_opposed_pistons_in_one_direction_are_told_with_what_to_type() -> None:
+def test_opposed_pistons_in_one_direction_are_reported_with_a_remedy() -> None:
     (line,) = warnings(FLAT_FOUR)
     assert "cylinders 1 and 3, 2 and 4" in line
     assert 'write numbering = "alternating"; in the present numbers the order is 1-2-3-4' in line
@@ -270,7 +270,7 @@ def test_the_smallest_change_of_numbers_is_proposed(own: Table) -> None:
     assert warnings({**FLAT_FOUR, "numbering": "alternating", **own}) == []
 
 
-def test_a_vee_that_other_numbers_make_more_even_is_told() -> None:
+def test_a_vee_with_a_more_even_numbering_is_reported() -> None:
     (line,) = warnings(ODD_SIX)
     assert "fires after 30, 120, 120, 210, 120, 120 deg" in line
     assert (

@@ -62,7 +62,7 @@ def test_an_open_ratio_is_decided_as_the_best_of_those_that_are_given() -> None:
         (1.0, {"stroke": {"between": ["80 mm", "160 mm"]}, "bore": None}, "engine.bore"),
     ],
 )
-def test_what_cannot_follow_is_refused(ratio: Any, engine: dict[str, Any], said: str) -> None:
+def test_quantities_that_cannot_follow_are_refused(ratio: Any, engine: dict[str, Any], said: str) -> None:
     given = tables(ratio, **engine)
     given["engine"] = {key: value for key, value in given["engine"].items() if value is not None}
     with pytest.raises(InputError, match=said):

@@ -67,7 +67,7 @@ def complaint_about(path: Path) -> str:
     return rest
 
 
-def test_what_is_changed_below_is_right_as_it_stands(tmp_path: Path) -> None:
+def test_the_unchanged_files_are_valid(tmp_path: Path) -> None:
     for text in (WHOLE, PARTS):
         problem = load(written(tmp_path, text))
         assert evaluate(problem).loads
@@ -287,7 +287,7 @@ BAD = [
 ]  # fmt: skip
 
 
-def test_all_missing_keys_are_told_at_once() -> None:
+def test_all_missing_keys_are_named_at_once() -> None:
     """Whatever finds them: the model of the file, the engine, its layout, an operating point."""
     with pytest.raises(InputError) as caught:
         load('title = "x"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n[gas]\nmodel = "wiebe"\nimep = "1 bar"\n'
@@ -424,7 +424,7 @@ class TestOnEvaluation:
 class TestOperatingPoints:
     """Gas of an operating point."""
 
-    def test_what_cannot_be_reached_says_where(self, tmp_path: Path) -> None:
+    def test_an_unreachable_imep_names_its_operating_point(self, tmp_path: Path) -> None:
         text = changed(
             WHOLE, "[gas]", '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nimep = "0.1 bar"\n[gas]'
         )

@@ -36,7 +36,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize(("text", "said"), FAULTS.values(), ids=FAULTS)
-def test_what_breaks_toml_is_told_with_its_place_and_remedy(text: str, said: str) -> None:
+def test_broken_toml_is_reported_with_place_and_remedy(text: str, said: str) -> None:
     with pytest.raises(InputError) as caught:
         load(f"{text}\n")
     assert "\n" not in str(caught.value)

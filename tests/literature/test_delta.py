@@ -81,7 +81,7 @@ def test_forces_are_those_of_the_masses(reversed_crank: int, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_what_is_left_of_a_row() -> None:
+def test_remaining_forces_of_a_deltic_row() -> None:
     """Weights on the three cranks take the first order off; those on two that turn alike share it as they like."""
     result = solved("deltic-row")
     assert [rank.proof for rank in result.ranks] == [Proof.GLOBAL] * 2

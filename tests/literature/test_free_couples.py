@@ -200,7 +200,7 @@ def test_turning_couple_has_the_star_of_the_first_order(row: Row) -> None:
     assert smallest == pytest.approx(largest, rel=1e-14)
 
 
-def test_higher_orders_and_offset_tell() -> None:
+def test_higher_orders_and_offset_change_the_couple() -> None:
     """The second-order couple is 1.7 % over lambda F_I here, and an offset adds odd orders: leaving them out shows."""
     row = INLINE[0]
     exact, truncated = (abs(_loads(row, 2, fidelity)[4]) for fidelity in (EXACT, TWO_ORDER))
@@ -270,7 +270,7 @@ def test_couples_of_odd_engines_follow_from_their_firing_order(name: str, order:
     assert _ready(name, order).force == pytest.approx(0.0, abs=1e-12)
 
 
-def test_what_turns_against_the_crank() -> None:
+def test_backward_shares_of_hasselgruber() -> None:
     """Hasselgruber 1964, eq. 33: none at 90 degrees, half of it upright; the V8's couple turns with the crank."""
     assert _ready("vee-two-90", 1).force_against == pytest.approx(0.0, abs=1e-12)
     assert _ready("tractor-single", 1).force_against == pytest.approx(0.5)

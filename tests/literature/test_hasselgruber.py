@@ -335,7 +335,7 @@ class TestEqualPower:
     reference = 4
 
     @pytest.mark.parametrize("cylinders", [1, 2, 3, 4, 6])
-    def test_what_is_kept(self, cylinders: int) -> None:
+    def test_power_and_piston_speed_are_invariant(self, cylinders: int) -> None:
         """Eqs. 14 to 17: power z D^2 s n and piston speed s n stay, and with them z D^2."""
         scale, share = equal_power_scale(cylinders, self.reference), cylinders / self.reference
         assert share * scale.length**2 * scale.length * scale.speed == pytest.approx(1.0, rel=1e-15)

@@ -170,7 +170,7 @@ class TestNames:
         assert not name_of_crank([0.0, 1.0])
         assert not name_of_crank([0.0])
 
-    def test_a_name_that_is_none_is_told(self, tmp_path: Path) -> None:
+    def test_an_unknown_twin_name_is_refused(self, tmp_path: Path) -> None:
         text = (PROBLEMS / "twin-parallel-270.toml").read_text(encoding="utf-8")
         with pytest.raises(InputError, match='"parallel-270"') as caught:
             loaded(tmp_path, changed(text, '"parallel-270"', '"parallel-275"'))

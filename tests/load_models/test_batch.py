@@ -93,7 +93,7 @@ def test_a_design_that_needs_more_samples_is_seen() -> None:
     ("name", "said"),
     [("vee-six-open", "throws or firing order"), ("tractor-four-shaft-heights", "fix shaft")],
 )
-def test_what_is_no_unbalance_is_refused(name: str, said: str) -> None:
+def test_designs_that_differ_in_more_than_unbalances_are_refused(name: str, said: str) -> None:
     with pytest.raises(ModelError, match="differ in unbalances alone") as refused:
         prepare(load(PROBLEMS / f"{name}.toml"))
     assert said.removeprefix("fix shaft") in str(refused.value)

@@ -149,7 +149,7 @@ class TestOpposedPistons:
         assert engine.cylinders == engine.slider_cranks[:3]
         assert np.degrees(engine.firing_intervals) == pytest.approx([120.0] * 3)
 
-    def test_what_stands_back_to_back_is_no_cylinder(self) -> None:
+    def test_pistons_back_to_back_share_no_chamber(self) -> None:
         """Pistons that move away from each other's crank share none: a boxer, and cranks the other way up."""
         boxed, _ = build(FOUR, boxer(2, 0.1, 0.0), MECHANISM, (math.pi / 2, -math.pi / 2))
         assert not boxed[0].faces(boxed[1])

@@ -110,7 +110,7 @@ max = 0.828998
 """
 
 
-def test_a_cone_solver_that_gives_up_is_asked_how_near_the_limits_can_be_met(tmp_path: Path) -> None:
+def test_a_failed_cone_solve_finds_the_least_excess(tmp_path: Path) -> None:
     """No stiffness keeps both limits: the least excess, which is convex, is positive for a search without cones too."""
     problem = problem_of(tmp_path, CONTRADICTION)
     result = solve(problem)
@@ -217,7 +217,7 @@ angle = { between = [0, 360] }
         ('terms = [{ quantity = "rms shaking force" }, { quantity = "rms mount force" }]', "stiffness"),
     ],
 )
-def test_what_nothing_open_changes_is_proven(objective: str, opened: str, tmp_path: Path) -> None:
+def test_an_objective_without_open_numbers_is_proven(objective: str, opened: str, tmp_path: Path) -> None:
     """Check the proof of an objective that no open number changes, or that is a known share."""
     stays = '{ between = ["20 N/mm", "4000 N/mm"], start = "400 N/mm" }'
     mounts = MOUNTS if opened == "stiffness" else MOUNTS.replace(stays, '"400 N/mm"')

@@ -225,6 +225,6 @@ def test_the_shortfall_is_what_shares_lack(decoupled):
         (SHORT + '[[constraints]]\nlimit = "decoupling shortfall"\nmin = 0.1', "cannot stand beside"),
     ],
 )
-def test_what_means_nothing_is_refused_in_a_line(tmp_path, objective, message):
+def test_meaningless_input_is_refused_in_a_line(tmp_path, objective, message):
     with pytest.raises(InputError, match=message.replace(".", r"\.")):
         problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective)

@@ -230,7 +230,7 @@ def test_damping_that_couples_modes_excites_more():
     assert len(uneven.excited(lift())) > 1
 
 
-def test_what_is_left_out_would_be_zero():
+def test_omitted_orders_have_no_response():
     mounting, load = four(), lift((1, 2, 4))
     amplitudes = mounting.responses(load.orders * 80.0, load.coefficients)
     excited = mounting.excited(load)

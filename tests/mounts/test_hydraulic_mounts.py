@@ -228,7 +228,7 @@ def test_a_table_is_read_with_its_units(tmp_path: Path) -> None:
          "negative loss"),
     ],
 )  # fmt: skip
-def test_what_means_nothing_is_refused_in_a_line(mounts, rows, more, message, tmp_path: Path) -> None:
+def test_meaningless_input_is_refused_in_a_line(mounts, rows, more, message, tmp_path: Path) -> None:
     (tmp_path / "mount.csv").write_text(rows)
     with pytest.raises(InputError) as refused:
         problem_of(tmp_path, ENGINE, BLOCK, mounts, RMS, more)

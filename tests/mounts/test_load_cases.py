@@ -280,7 +280,7 @@ def test_both_are_proven_and_stops_save_stiffness(least_stiff) -> None:
         (CASES.replace('"400 N m"', '"400 N"'), "", "torque"),
     ],
 )
-def test_what_means_nothing_is_refused_in_a_line(cases, more, message, tmp_path: Path) -> None:
+def test_meaningless_input_is_refused_in_a_line(cases, more, message, tmp_path: Path) -> None:
     with pytest.raises(InputError) as refused:
         problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, cases, SOFT, more)
     assert message in str(refused.value)

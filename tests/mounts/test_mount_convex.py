@@ -145,7 +145,7 @@ def test_limits_that_cannot_be_met_together_are_named(tmp_path):
     assert result.message == "no design exists: 'natural frequencies' and 'static sag' contradict each other"
 
 
-def test_what_is_not_convex_is_not_called_so(tmp_path):
+def test_nonconvex_mount_problems_are_recognised(tmp_path):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
     assert is_convex(problem)
     band = changed(SAG, ('max = "40/3 Hz"', 'outside = ["12 Hz", "20 Hz"]'))

@@ -203,7 +203,7 @@ class ScriptedSearch:
     ("stiffness", "count"), [([1e5, 1e5], 2), ([2e5 * (1.0 - 1e-8)] * 2, 1), ([3e5, 3e5], 1)],
     ids=["better", "as good", "worse"],
 )  # fmt: skip
-def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, count, tmp_path, monkeypatch):
+def test_boxes_bound_the_best_design_of_the_search(stiffness, count, tmp_path, monkeypatch):
     """Boxes that lead to a better design are divided once more, for the value that there is now."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
     values = []
@@ -224,7 +224,7 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, count, t
     assert (found.bound, found.boxes) == (0.9 * values[-1], 3)
 
 
-def test_what_is_convex_in_a_sum_is_bounded_by_its_own_optimum(tmp_path):
+def test_convex_terms_of_a_sum_are_bounded_by_their_optimum(tmp_path):
     """The sag is least on the stiffest springs, whatever the force beside it is; the force alone has no such bound."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
     sag = Term(Measure(channels.SAG), 200.0)
@@ -360,7 +360,7 @@ def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
     assert solve_joint(problem).objective.value == pytest.approx(13.106325, rel=1e-5)
 
 
-def test_a_limit_on_a_load_has_a_price_where_it_is_felt(tmp_path):
+def test_an_active_limit_on_a_load_has_a_price(tmp_path):
     def found(maximum: float):
         limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{maximum} N"\n'
         return solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limits, SEARCH))
@@ -418,7 +418,7 @@ def test_a_search_is_refined_from_its_best_end(ends, chosen, tmp_path, monkeypat
     assert [search.joint.decision_values(start)[0] for start in begun] == [pytest.approx(places[chosen])]
 
 
-def test_what_nothing_open_moves_is_a_number_of_the_program(tmp_path):
+def test_constant_terms_are_numbers_of_the_program(tmp_path):
     """The roll moment of the block beside open mounts has no rows: hundreds of them would be carried along."""
     problem = joint_problem(tmp_path, "rms", '[[constraints]]\nlimit = "static sag"\nmax = "3 mm"\n')
     alone = replace(problem, decisions=problem.mount_decisions)
@@ -444,7 +444,7 @@ def test_unbalances_on_the_mounts_of_a_design_become_the_best_of_these_mounts(tm
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0])
-def test_how_far_ends_are_from_each_other_is_told_in_every_unit(unit):
+def test_the_spread_of_optima_is_reported_in_every_unit(unit):
     none = np.zeros(0)
     ends = [
         LocalOptimum(np.array([value]), unit * value, none, none, 0.0, 0.0, 1, 0.0, Ending.CONVERGED, k)

@@ -89,7 +89,7 @@ def test_stars_left_out_leave_no_bound(tmp_path):
 
 
 @pytest.mark.parametrize("best", [1, 2, 50])
-def test_stars_are_counted_and_as_many_as_are_asked_for_are_kept(best, tmp_path):
+def test_stars_are_counted_and_the_best_are_ranked(best, tmp_path):
     """Check the three stars of four throws at 0 and 180 degrees, and that the best ones come first."""
     problem = problem_of(tmp_path, *parts(), f"[phasing]\nbest = {best}\n")
     ranked, designs = _stars(problem, problem.phasing)
@@ -101,7 +101,7 @@ def test_stars_are_counted_and_as_many_as_are_asked_for_are_kept(best, tmp_path)
     assert throws[0] == (0, 180, 180, 0)
 
 
-def test_how_stars_were_decided_is_counted(tmp_path):
+def test_the_method_counts_stars_by_how_they_were_decided(tmp_path):
     """Stars that stand, those of the ranking that were left out, and starts whose throws were moved."""
     still = StarDesign(Candidate((0.0, math.pi)), evaluate_only(problem_of(tmp_path, *parts(str(STARS[0])))))
     moved = replace(still, has_moved_throws=True)
@@ -137,7 +137,7 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
 
 
 @pytest.mark.slow
-def test_where_no_star_matters_the_proof_of_the_mounts_holds(tmp_path):
+def test_the_proof_of_mounts_holds_for_all_stars(tmp_path):
     """Sag and natural frequencies know no throws: every star has the same proven optimum."""
     engine = changed(ENGINE, ('"open"', '"open"'), ('[[counterweights]]\nname = "web"\n', ""),
                      ("balance_factor = { between = [0, 1] }\n", ""))  # fmt: skip
@@ -341,7 +341,7 @@ intervals = { largest_deviation = "350 deg" }
 
 
 @pytest.mark.slow
-def test_transmissibility_tells_firing_orders_apart(tmp_path):
+def test_transmissibility_depends_on_the_firing_order(tmp_path):
     """Gas is in what is transmitted, so that of twelve orders of one throw the even one is found."""
     objective = '[objective]\nminimise = "transmissibility"\n'
     problem = problem_of(tmp_path, RADIAL, BLOCK, ONE_OPEN, objective, UNBOUNDED)

@@ -142,7 +142,7 @@ def test_the_linear_model_leaves_out_no_more_than_the_mass_that_moves():
 
 @pytest.mark.slow
 @pytest.mark.validation
-def test_what_turns_at_imposed_speed_does_not_roll_with_the_block():
+def test_parts_at_imposed_speed_do_not_roll_with_the_block():
     """E1a: a flywheel of a sixth of the block's inertia, told apart and taken for a part of what rolls."""
     assert left_out(0.5, 1.0) < 0.0015
     assert left_out(0.5, 1.0, turns=False) > 0.005
@@ -158,7 +158,7 @@ def test_roll_alone_is_slower_with_what_turns_counted_in():
 
 
 @pytest.mark.parametrize("inertia", [-0.1, 6.0, 7.0])
-def test_what_turns_is_less_than_the_whole(inertia):
+def test_turning_inertia_above_the_block_is_refused(inertia):
     with pytest.raises(ModelError, match="turning_inertia"):
         Block(100.0, ((6.0, 0, 0), (0, 8.0, 0), (0, 0, 8.0)), turning_inertia=inertia)
 

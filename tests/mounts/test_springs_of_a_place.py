@@ -198,7 +198,7 @@ JOINED = '[[mounts.places]]\nname = "pad"\njoined_to = "front left"\nstiffness =
         (JOINED + "damping_per_stiffness = 0.001", "has no unit"),
     ],
 )
-def test_what_means_nothing_is_refused_in_a_line(more: str, told: str, tmp_path: Path) -> None:
+def test_meaningless_input_is_refused_in_a_line(more: str, told: str, tmp_path: Path) -> None:
     with pytest.raises(InputError) as refused:
         problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, more, RMS)
     assert told in str(refused.value)

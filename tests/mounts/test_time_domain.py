@@ -110,7 +110,7 @@ def test_standstill_is_refused():
     assert elastic_mounting(powertrain().block, [replace(m, stop_gap=0.01) for m in powertrain().mounts])
 
 
-def test_roll_of_the_block_is_the_turn_that_its_mounts_tell():
+def test_roll_of_the_block_follows_from_its_mount_travels():
     """Compare the roll of random motions with the turn about x that the travels of three mounts determine."""
     mounting = powertrain(damping=20.0)
     model, rng = time_model(mounting), np.random.default_rng(5)

@@ -85,7 +85,7 @@ def test_an_edit_leaves_all_other_mutants_in_the_sample(tmp_path, monkeypatch) -
     assert len(samples[1]) == len(samples[0]) + 2
 
 
-def test_what_is_listed_as_equivalent_is_a_mutant_with_a_reason() -> None:
+def test_listed_equivalent_mutants_have_a_reason() -> None:
     listed = equivalents()
     files = {change.partition(":")[0] for change in listed}
     made = {mutant.change for file in files for mutant in mutants_of(SOURCE / file)}

@@ -67,13 +67,13 @@ def half(number: int) -> float:
     return 0.5 * number
 
 
-def test_answers_that_cannot_be_fetched_are_asked_for_again() -> None:
+def test_answers_that_cannot_be_fetched_are_requested_again() -> None:
     client = Client(unreachable=2)
     assert sorted(unordered_map(half, [2, 4, 6], Cluster(client))) == [(0, 1.0), (1, 2.0), (2, 3.0)]
     assert client.calls == 5
 
 
-def test_what_a_call_raises_is_its_own_and_asked_for_once() -> None:
+def test_an_error_of_a_call_is_raised_after_one_request() -> None:
     client = Client(unreachable=0)
     with pytest.raises(ValueError, match="3 is odd"):
         list(unordered_map(half, [3], Cluster(client)))

@@ -120,7 +120,7 @@ class TestStarSum:
         rounding = (len(members) + 4) + 20 * abs(multiple)
         assert error <= rounding * EPS * float(np.abs(weights).sum())
 
-    def test_what_is_no_rounding_stays(self) -> None:
+    def test_remainders_above_rounding_stay(self) -> None:
         """A remainder of a hundred roundings is a load, not a zero."""
         weights = np.array([[1.0], [1.0 + 100 * EPS]])
         found = star_sum(weights, [Fraction(0), Fraction(1, 2)], np.array([1]))[0, 0]

@@ -289,7 +289,7 @@ class TestForms:
         assert norm.norm_from_lengths(many, weights).tolist() == pytest.approx(expected, rel=ROUNDING, abs=1e-100)
 
     @given(rows())
-    def test_what_it_says_of_itself(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
+    def test_claimed_properties_of_a_norm_hold(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         weights, v, _ = data
         grid, parts = one_signal(weights), [v * (np.arange(len(v)) == k)[:, None] for k in range(len(v))]
         if norm.is_euclidean:

@@ -60,7 +60,7 @@ def test_the_diameter_is_that_of_brute_force(components, seed):
     assert NORM.value(grid(11), points) == pytest.approx(smallest_ball(points), rel=1e-9)
 
 
-def test_of_one_component_it_is_the_largest_less_the_smallest():
+def test_one_component_is_the_largest_less_the_smallest():
     values = np.random.default_rng(0).normal(size=(50, 1)) + 30.0
     assert NORM.value(grid(50), values) == pytest.approx(np.ptp(values), rel=1e-12)
 

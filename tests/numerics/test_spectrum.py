@@ -166,7 +166,7 @@ class TestSpectrumOf:
         np.testing.assert_allclose((values**2).mean(axis=0), power, rtol=1e-12, atol=1e-12)
 
 
-def test_orders_are_told_apart_to_a_thousandth() -> None:
+def test_orders_differ_from_a_thousandth() -> None:
     orders = [0.0, 0.5, 1.0 / 3.0, 1.0, 1.001]
     assert orders_equal(orders, (0.3333, 1.0)).tolist() == [False, False, True, True, False]
     signal = Spectrum(Fraction(1, 2), np.arange(1.0, 6.0).astype(complex))

@@ -84,7 +84,7 @@ def test_calls_are_worked_on_side_by_side(tmp_path: Path) -> None:
         assert [future.result() for future in begun] == [b"0", b"1", b"2"]
 
 
-def test_who_works_may_be_asked_while_workers_begin(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pool_accepts_work_while_workers_start(monkeypatch: pytest.MonkeyPatch) -> None:
     class Begun:
         """Stand-in for a process."""
 
@@ -120,7 +120,7 @@ def test_a_worker_that_is_killed_costs_no_answer() -> None:
 
 
 @pytest.mark.slow
-def test_what_ends_its_workers_is_given_up() -> None:
+def test_a_call_that_kills_its_workers_is_given_up() -> None:
     with Processes(1) as pool:
         with pytest.raises(WorkerDied):
             pool.submit(os._exit, 3).result()

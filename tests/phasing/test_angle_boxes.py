@@ -252,7 +252,7 @@ def test_intervals_bound_the_bank_angle() -> None:
 
 
 @pytest.mark.slow
-def test_what_knows_where_the_crank_stands_is_bounded_too() -> None:
+def test_weights_at_a_fixed_angle_are_bounded() -> None:
     """A weight at an angle of its own does not turn with the crank: throws are then turned by the bank angle."""
     fixed = '[[counterweights]]\nname = "still"\nx = "50 mm"\nunbalance = "0.01 kg m"\nangle = 30\n'
     problem = _read(TWIN + MOUNTS + WEIGHTS + fixed + _objective("rms shaking force"))

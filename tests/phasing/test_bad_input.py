@@ -133,7 +133,7 @@ def test_open_throws_ask_for_what_given_throws_ask_for(key):
             laufruhe.load(f'title = "x"\n[engine]\n{head}\ncylinder_spacing = "100 mm"\n{throws}\n{rest}')
 
 
-def test_cylinders_are_asked_for(tmp_path):
+def test_a_missing_number_of_cylinders_is_refused(tmp_path):
     engines.problem(tmp_path, 4, engine='throws = "open"')
     path = tmp_path / "none.toml"
     path.write_text((tmp_path / "scene.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")

@@ -146,7 +146,7 @@ def test_a_limit_that_nothing_open_moves_leaves_a_star_its_optimum(tmp_path):
     assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
-def test_designs_that_are_told_as_proven_are_the_best(tmp_path):
+def test_designs_marked_as_proven_are_the_best(tmp_path):
     problem = engines.problem(tmp_path, 5, phasing="best = 2", rest=CASES["rms"])
     model, stars = model_of(problem)
     found = search_even(problem, problem.phasing, families_of(problem.phasing)[0])
@@ -268,7 +268,7 @@ def test_given_throws_that_break_a_limit_are_no_design(tmp_path):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("measure", ["rms shaking force", "mean mount force", "rms shaking force, mean rocking couple"])
 @pytest.mark.parametrize("cylinders", [3, 4, 5])
-def test_an_order_that_every_star_cancels_asks_for_nothing(tmp_path, cylinders, measure, order):
+def test_a_cancelled_order_sets_no_scale_for_unbalances(tmp_path, cylinders, measure, order):
     """Check that roundings of an order that all stars cancel set no scale for unbalances."""
     names = measure.split(", ")
     terms = f'[[objective.terms]]\nquantity = "{names[0]}"\norders = [{order}]\n'

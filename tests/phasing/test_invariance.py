@@ -117,7 +117,7 @@ IMAGED = list(itertools.product((0, 1, 2, 3, 6, 8, 4, 5, 7, *range(9, 30)), IMAG
 
 
 @pytest.mark.parametrize(("seed", "changed"), first_fast(IMAGED, 16, 24))
-def test_mirrored_reversed_and_told_in_another_order(tmp_path, seed, changed):
+def test_optima_are_invariant_to_mirror_reversal_and_numbering(tmp_path, seed, changed):
     same(tmp_path, seed, **changed)
 
 

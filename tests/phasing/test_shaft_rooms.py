@@ -61,7 +61,7 @@ def test_a_shaft_without_room_is_left_out(name: str, throws: Any) -> None:
     assert math.isclose(result.objective.value, free.objective.value, rel_tol=1e-3)
 
 
-def test_shafts_that_are_wanted_and_have_no_room_are_named() -> None:
+def test_needed_shafts_without_room_are_infeasible() -> None:
     """Check that shafts without room are infeasible if a limit on the force needs them."""
     maximum = {"limit": "rms shaking force", "max": "1000 N", "name": "force"}
     result = _solved([LIMITS["one is beyond the envelope"][0], maximum])

@@ -42,14 +42,14 @@ def test_a_stage_too_large_to_hold_is_none():
     assert stage(make).finer.finer is None
 
 
-def test_steps_are_asked_for_where_boxes_tell_no_more():
+def test_narrow_boxes_near_the_value_need_more_steps():
     wide, narrow = (SimpleNamespace(spread=np.array([width, 0.0])) for width in (0.2, 0.05))
     assert stage().is_exhausted(900.0, 1000.0, wide)
     assert not stage().is_exhausted(800.0, 1000.0, wide)
     assert stage().is_exhausted(800.0, 1000.0, narrow)
 
 
-def test_a_peak_misses_no_more_than_told(tmp_path):
+def test_a_peak_misses_no_more_than_its_error_estimate(tmp_path):
     """Check that fine samples exceed coarse ones by no more than the error estimate, which falls with the step."""
     rest = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "maximum")
     problem = engines.problem(tmp_path, 3, "two-stroke", "throws = [0, 100, 230]", "", rest, samples=96)

@@ -93,7 +93,7 @@ def test_more_freedom_is_never_worse(tmp_path):
     assert values[0] < 0.2 * found[0].initial
 
 
-def test_intervals_that_no_crank_keeps_are_told_what_is_needed(tmp_path):
+def test_infeasible_intervals_name_the_needed_range(tmp_path):
     result = crooked_vee(tmp_path, 10, 90, 17)
     assert result.status is Status.INFEASIBLE
     assert "from 54 to 90 deg" in result.message

@@ -136,7 +136,7 @@ def test_no_design_in_a_box_goes_under_its_bound(tmp_path, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["couple", "gas", "limited", "riders", "vee with gas"])
-def test_what_is_cut_off_is_not_better(tmp_path, name):
+def test_no_better_crank_is_cut_off(tmp_path, name):
     """A box is cut down to where something may be better than a value: a better crank stays inside."""
     problem, phasing, windows = scene(tmp_path, name)
     rng = np.random.default_rng(8)

@@ -556,7 +556,7 @@ class TestRefusals:
             cylinder_pressure(gas, PARTS["plain"], Cycle.FOUR_STROKE, 90)
         _one_line(error, *words)
 
-    def test_range_told_is_the_range_that_can_be_reached(self) -> None:
+    def test_the_stated_range_of_imep_can_be_reached(self) -> None:
         """Check that a mean pressure just inside the stated range is accepted, and just outside refused."""
         minimum, maximum = (seiliger_imep(DIESEL, Cycle.FOUR_STROKE, ratio) for ratio in (1.0, 17.0))
         for inside in (minimum + 1.0, maximum - 1.0):
@@ -622,7 +622,7 @@ class TestHasselgruber:
         assert self.force(DIESEL) == pytest.approx(263.3, abs=0.5)
         assert self.force(DIESEL) == pytest.approx(300.0, rel=0.15)
 
-    def test_what_it_hangs_on(self) -> None:
+    def test_force_depends_on_the_compression_ratio(self) -> None:
         """Check that a gauge pressure of 80 kp/cm2 changes the force little, and the compression ratio much."""
         assert self.force(replace(DIESEL, peak_pressure=81 * AT)) == pytest.approx(263, abs=1.5)
         assert self.force(replace(DIESEL, compression_ratio=20.5)) == pytest.approx(300, abs=3)
@@ -632,7 +632,7 @@ class TestCylindersAlike:
     """The gas of a cylinder is computed once for all that it drives alike."""
 
     @every_part
-    def test_what_it_weighs_and_where_it_stands_is_no_matter(self, part: SliderCrank) -> None:
+    def test_gas_is_independent_of_mass_and_place(self, part: SliderCrank) -> None:
         gas, cycle = replace(DIESEL, imep=8.7 * AT), Cycle.FOUR_STROKE
         heavier = replace(part, reciprocating_mass=2.0, rotating_mass=0.3, x=0.4, throw=1.0, bank=0.5, firing_angle=1.0)
         first = gas_coefficients(gas, part, cycle)

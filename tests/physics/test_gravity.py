@@ -182,6 +182,6 @@ def test_irregularity_with_weights_is_no_matter_of_the_flywheel_alone(inertia: o
         ("tractor-single", {"fidelity": {"crank_inertia": "2 kg m^2"}}, "crank_inertia"),
     ],
 )  # fmt: skip
-def test_what_is_not_modelled_together_is_refused(ready: str, changes: dict[str, Any], words: str) -> None:
+def test_unsupported_combinations_with_gravity_are_refused(ready: str, changes: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         weighed(ready, **changes)

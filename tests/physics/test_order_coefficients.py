@@ -194,7 +194,7 @@ class TestAgainstTextbookSeries:
         assert -computed.real == pytest.approx(float(series), rel=RELATIVE)
 
     @pytest.mark.parametrize("rod_ratio", [0.2, 0.25, 0.3])
-    def test_omitted_terms_tell(self, rod_ratio: float) -> None:
+    def test_omitted_terms_of_the_textbook_exceed_the_tolerance(self, rod_ratio: float) -> None:
         """The textbook's A_2 = lambda alone is wrong by lambda^2 / 4, and no tolerance here would let it pass."""
         second = piston_acceleration_orders(rod_ratio, 0.0, 2)[2]
         assert abs(second + rod_ratio) > 1e10 * RELATIVE * rod_ratio

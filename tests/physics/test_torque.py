@@ -34,7 +34,7 @@ def case(name: str) -> tuple[Engine, laufruhe.problem.problem.OperatingPoint]:
 
 
 @pytest.mark.parametrize("name", ["tractor-single", "tractor-three", "tractor-four-lanchester", "vee-six-90"])
-def test_the_block_feels_the_torque_of_plain_cylinders(name: str) -> None:
+def test_the_torque_of_plain_cylinders_is_the_roll_moment(name: str) -> None:
     """T is the roll moment (C7), by energy here and by momentum there."""
     engine, point = case(name)
     torque, wrench = crank_torque(engine, point), shaking_loads(engine, point)
@@ -250,7 +250,7 @@ def test_parts_of_the_torque_add_up(name: str) -> None:
     assert np.any(parts["rods"].coefficients) == any(part.rod_inertia_deficit != 0.0 for part in engine.slider_cranks)
 
 
-def test_the_diagram_is_drawn_where_it_is_asked(tmp_path: Path) -> None:
+def test_the_torque_diagram_is_drawn_for_flywheels(tmp_path: Path) -> None:
     for name, drawn in (("diesel-70-hp-flywheel", True), ("tractor-single", False)):
         result = laufruhe.solvers.evaluate_only(laufruhe.load(PROBLEMS / f"{name}.toml"))
         assert applies(result) is drawn

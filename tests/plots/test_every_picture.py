@@ -89,7 +89,7 @@ SIDE_BY_SIDE = {
 
 @pytest.mark.parametrize("eye", SEEN)
 @pytest.mark.parametrize("name", SIDE_BY_SIDE)
-def test_colours_side_by_side_are_told_apart(name: str, eye: str) -> None:
+def test_colours_side_by_side_differ(name: str, eye: str) -> None:
     for one, other in combinations(SIDE_BY_SIDE[name], 2):
         assert np.linalg.norm(lab(one, eye) - lab(other, eye)) > 12.0, (one, other)
 

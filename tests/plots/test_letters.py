@@ -86,7 +86,7 @@ def test_a_picture_has_the_letters_of_that_font(tmp_path: Path) -> None:
     assert sun > 0.7 > moon
 
 
-def test_a_letter_has_one_font_whatever_was_asked_before(tmp_path: Path) -> None:
+def test_the_font_of_a_letter_is_independent_of_earlier_texts(tmp_path: Path) -> None:
     for name, has in (("Both Sans", SUN + MOON), ("A Sun Sans", SUN), ("Moon", MOON)):
         install(tmp_path, name, has)
     for texts in ([MOON, SUN], [SUN, MOON], [SUN + MOON]):

@@ -44,7 +44,7 @@ def test_a_half_disc_has_the_unbalance_that_it_stands_for() -> None:
     assert moment == pytest.approx(0.03, rel=1e-4)
 
 
-def test_what_was_decided_is_marked() -> None:
+def test_decided_parts_are_marked() -> None:
     result = scenes.solved(scenes.TIGHT)
     view = EngineView.from_result(result)
     assert view.rotors == {rotor.name for rotor in result.final.engine.rotors}

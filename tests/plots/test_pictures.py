@@ -93,7 +93,7 @@ def test_the_ring_stands_where_the_first_cylinder_fires() -> None:
     assert "dead centre" not in texts(engine.figure(result))
 
 
-def test_what_hardly_moves_is_shown_without_its_steady_part() -> None:
+def test_small_motions_are_drawn_without_their_mean() -> None:
     angles = np.linspace(0.0, math.tau, 181)
     path = np.stack([0.0 * angles, 3.0 * np.cos(angles), 200.0 + np.sin(angles)], axis=-1)[:, None, :]
     (moved,), note = polar._moving([path])

@@ -201,7 +201,9 @@ class TestCounterweights:
         [("[0, 360]", False, True), ("[0, 359.9999999]", False, True), ("[-180, 180]", False, True),
          ("[10, 190]", False, False), ("[30, 30]", True, False)],
     )  # fmt: skip
-    def test_how_far_an_angle_is_open(self, folder: Path, between: str, fixed: bool, free: bool) -> None:
+    def test_bounds_of_an_angle_are_a_sector_or_a_disc(
+        self, folder: Path, between: str, fixed: bool, free: bool
+    ) -> None:
         """A whole turn but for a rounding is a whole turn: the disc, not a sliver of it."""
         text = f"""
         [[counterweights]]

@@ -201,7 +201,7 @@ class TestParse:
                 parse(text, "")
             assert str(caught.value).endswith(said)
 
-    def test_units_that_are_used_mostly_are_told(self) -> None:
+    def test_an_unknown_unit_names_common_ones(self) -> None:
         with pytest.raises(UnitError, match=r'"120 mm", in m, mm, cm \.\.\.$'):
             parse("120 x", "m")
 
@@ -291,5 +291,5 @@ class TestShown:
         assert quantity_text(value, unit) == text
 
     @given(st.floats(-1e6, 1e6, allow_subnormal=False), st.sampled_from(["m", "rad", "rad/s", "kg", "N m", ""]))
-    def test_what_is_shown_can_be_read(self, value: float, unit: str) -> None:
+    def test_a_printed_quantity_is_read_back(self, value: float, unit: str) -> None:
         assert parse(quantity_text(value, unit, 17), unit) == pytest.approx(value, rel=1e-14, abs=0.0)

@@ -69,7 +69,7 @@ def test_it_ends_at_the_least_of_all(seed: int, batch_size: int) -> None:
 
 
 @pytest.mark.parametrize("maximum", [1, 2, 7, 20])
-def test_what_is_left_bounds_all_that_was_not_looked_at(maximum: int) -> None:
+def test_remaining_nodes_bound_an_unfinished_search(maximum: int) -> None:
     numbers = np.random.default_rng(5).normal(size=64)
     search = Least(numbers)
     bound = search.divide(search.bound((0, 64)), maximum)
@@ -79,7 +79,7 @@ def test_what_is_left_bounds_all_that_was_not_looked_at(maximum: int) -> None:
     assert [one.bound for one in search.next_nodes(3)] == sorted(one.bound for one in search.open_nodes)[:3]
 
 
-def test_places_told_are_the_middles_of_the_least_boxes_left() -> None:
+def test_named_places_are_middles_of_the_least_boxes() -> None:
     """Check that the named places are near the minimum of a squared distance."""
     place = np.array([2.3, 7.1])
 
@@ -108,7 +108,7 @@ def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
     assert not search.complete
 
 
-def test_who_listens_hears_bounds_that_rise_under_the_best_value() -> None:
+def test_reported_bounds_rise_below_the_best_value() -> None:
     steps: list[Step] = []
     search = Least(np.random.default_rng(1).normal(size=64))
     with progress_listener(steps.append):

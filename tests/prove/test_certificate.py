@@ -117,7 +117,7 @@ class TestGap:
     def test_is_the_same_share_in_every_unit(self, unit: float) -> None:
         assert gap_of(2.0 * unit, 1.5 * unit, 0.0) == pytest.approx(0.25)
 
-    def test_what_is_nothing_beside_the_loads_counts_as_zero(self) -> None:
+    def test_values_at_the_zero_level_count_as_zero(self) -> None:
         assert make_certificate(1e-10, 0.0, 1e-9, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.GLOBAL
         assert make_certificate(0.0, 0.0, 0.0, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.GLOBAL
         assert make_certificate(1e-6, 0.0, 1e-9, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.LOCAL

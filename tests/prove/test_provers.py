@@ -63,6 +63,6 @@ def test_each_has_its_turn_until_one_closes(
 
 
 @pytest.mark.slow
-def test_a_question_without_a_design_asks_if_there_is_one(tmp_path: Path) -> None:
+def test_provers_find_no_bound_without_a_design(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
     assert run_provers(Question(problem, math.inf, math.inf)).bound < math.inf

@@ -315,7 +315,7 @@ orders = [1, 2]
 """
 
 
-def test_where_boxes_are_least_is_a_design_too(tmp_path: Path) -> None:
+def test_the_box_with_the_least_bound_gives_a_design(tmp_path: Path) -> None:
     """Check that boxes find the optimum where every start of the smooth search ends 0.4 % worse."""
     path = tmp_path / "far.toml"
     path.write_text(FAR_FROM_ALL_STARTS, encoding="utf-8")
@@ -331,7 +331,7 @@ def test_where_boxes_are_least_is_a_design_too(tmp_path: Path) -> None:
     assert "no search ended at this design" in explained(result) or result.certificate.kkt_residual < 1e-3
 
 
-def test_how_often_bounds_are_divided_may_be_said(tmp_path: Path) -> None:
+def test_the_number_of_boxes_can_be_chosen(tmp_path: Path) -> None:
     parts = (ENGINE, BLOCK, MOUNTS, "[objective]", OBJECTIVES["rms"])
     none, few = (problem_of(tmp_path, *parts, f"[search]\nboxes = {count}") for count in (0, 40))
     value = 1.17
@@ -344,7 +344,7 @@ def test_how_often_bounds_are_divided_may_be_said(tmp_path: Path) -> None:
         problem_of(tmp_path, *parts, "[search]\nboxes = -1")
 
 
-def test_what_is_not_divided(tmp_path: Path) -> None:
+def test_open_positions_losses_and_many_numbers_are_not_divided(tmp_path: Path) -> None:
     """Positions, losses and unbalances move more than stiffness; nine numbers are too many."""
     lossy = changed(MOUNTS, ('position  = ["300', 'loss_factor = { between = [0.05, 0.2] }\nposition  = ["300'))
     assert not is_stiffness_problem(problem_of(tmp_path, ENGINE, BLOCK, lossy, "[objective]", OBJECTIVES["rms"]))

@@ -74,7 +74,7 @@ def held(folder: Path) -> tuple[set[str], set[str]]:
 
 
 @pytest.mark.parametrize("inside", [False, True])
-def test_a_full_disk_is_told_by_the_folder_that_was_named(inside: bool, tmp_path: Path) -> None:
+def test_a_full_disk_names_the_chosen_folder(inside: bool, tmp_path: Path) -> None:
     def full() -> None:
         with staged(FileSet(tmp_path / "out", "--out", "solve", NAMES)) as stage:
             raise OSError(errno.ENOSPC, "No space left on device", *([str(stage / NAMES[0])] if inside else []))
@@ -186,7 +186,7 @@ def test_a_note_of_what_is_not_there_brings_nothing(named: str, tmp_path: Path) 
     assert json.loads((tmp_path / "set" / MADE).read_text())["files"] == ["new"]
 
 
-def test_what_came_in_the_meantime_stays(tmp_path: Path) -> None:
+def test_a_file_created_in_the_meantime_stays(tmp_path: Path) -> None:
     folder = tmp_path / "set"
     make(folder, "old", NAMES[:2])
     with pytest.raises(InputError, match=NAMES[3]):

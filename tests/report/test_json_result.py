@@ -148,7 +148,7 @@ def test_infeasible_says_what_was_minimised_and_proves_nothing() -> None:
 
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
-def test_what_is_no_number_is_null(odd: float) -> None:
+def test_a_number_that_is_not_finite_is_null(odd: float) -> None:
     result = replace(scenes.solved(scenes.TIGHT), error=lambda: odd)
     assert parsed(result)["fidelity"]["error_estimate"] is None
 
@@ -169,7 +169,7 @@ def test_every_order_is_written() -> None:
     assert [entry["order"] for entry in orders] == forces.orders[np.any(forces.coefficients, axis=(1, 2))].tolist()
 
 
-def test_loads_over_the_cycle_are_written_where_wanted() -> None:
+def test_loads_over_the_cycle_are_written_on_request() -> None:
     result = scenes.solved(scenes.TIGHT)
     assert "series" not in parsed(result)["points"][0]
     written = json.loads(as_json(result, series=True))

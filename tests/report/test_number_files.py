@@ -224,7 +224,7 @@ def test_a_file_is_named_after_the_table_that_it_holds() -> None:
 
 
 @pytest.mark.slow
-def test_what_only_the_report_knows_is_a_file_too() -> None:
+def test_tables_of_the_report_are_files() -> None:
     result, found = initial_tables("inline-five-torsion")
     assert "crankshaft-torque" in found
     assert set(found) <= {name.removesuffix(".csv") for name in result_files()}
@@ -337,7 +337,7 @@ def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
 
 
 @pytest.mark.slow
-def test_what_turns_with_and_against_the_crank_adds_up_to_the_order() -> None:
+def test_forward_and_backward_parts_add_up_to_the_order() -> None:
     """Largest and least length of an order's ellipse are the sum and the difference of its two circles."""
     result = evaluate_only(load(PROBLEMS / "twin-vee-offset-pins.toml"))
     sheet = number_tables(result)["turning-parts"]

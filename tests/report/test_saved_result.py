@@ -61,7 +61,7 @@ def test_a_ready_problem_is_read_back(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_was_decided_goes_into_the_problem_again(tmp_path: Path) -> None:
+def test_decided_values_go_into_the_problem_again(tmp_path: Path) -> None:
     result = solved("tractor-single")
     again = result.problem.with_values(saved(result, tmp_path).values)
     assert result.objective is not None
@@ -93,7 +93,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], Any]:
         (lambda r: r | {"objective": {**r["objective"], "value": "much"}}, "objective.value"),
     ],
 )
-def test_what_is_no_result_is_one_line_that_says_so(damaged: Any, said: str, tmp_path: Path) -> None:
+def test_a_damaged_result_is_refused_in_one_line(damaged: Any, said: str, tmp_path: Path) -> None:
     place = tmp_path / "result.json"
     place.write_text(json.dumps(damaged(json.loads(as_json(scenes.solved(scenes.TIGHT))))), encoding="utf-8")
     with pytest.raises(laufruhe.InputError) as caught:
@@ -103,13 +103,13 @@ def test_what_is_no_result_is_one_line_that_says_so(damaged: Any, said: str, tmp
 
 
 @pytest.mark.parametrize("text", ["", "{", "\x00", "[" * 100_000])
-def test_what_is_no_json_is_told(text: str, tmp_path: Path) -> None:
+def test_a_result_that_is_no_json_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "result.json").write_text(text, encoding="utf-8")
     with pytest.raises(laufruhe.InputError, match="file: is no JSON"):
         laufruhe.read_result(tmp_path)
 
 
-def test_what_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_missing_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(laufruhe.InputError, match=r"result\.json: file: does not exist"):
         laufruhe.read_result(tmp_path)
     with pytest.raises(laufruhe.InputError, match="path = 3: is of type int"):

@@ -64,7 +64,7 @@ def test_the_angle_of_nothing_is_a_dash() -> None:
     assert rows["left.angle"][2].endswith(" deg")
 
 
-def test_what_to_open_first_is_told() -> None:
+def test_the_screen_names_the_page_to_open_first() -> None:
     assert screen(scenes.solved(scenes.TIGHT)).endswith("Results: results/scene (begin with report.html)\n")
 
 
@@ -180,7 +180,7 @@ def test_units_of_another_dimension_are_refused() -> None:
         laufruhe.load(f'units = {{ force = "mm" }}\n{text}')
 
 
-def test_source_and_assumptions_are_told() -> None:
+def test_source_and_assumptions_are_in_the_report() -> None:
     text = result_document(scenes.solved(scenes.PARTS), (), "").as_markdown("")
     assert "Source: nowhere." in text
     assert "- none" in text
@@ -190,7 +190,7 @@ def test_markdown_in_names_means_nothing() -> None:
     assert escape_markdown("a|b\n*c* <d>") == r"a\|b \*c\* \<d\>"
 
 
-def test_why_a_star_wins_is_told_by_its_free_couples() -> None:
+def test_the_winning_star_is_explained_by_its_free_couples() -> None:
     """Rocking couples of a five: what is minimised is the couple of orders 1 and 2, so order 4 is not named."""
     result = solved("inline-five-open")
     assert why_star(result) == (

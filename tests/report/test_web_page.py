@@ -51,7 +51,7 @@ def page() -> _Page:
     return _Page(as_html(document, {"polar": SVG, "bars": SVG}))
 
 
-def test_the_language_is_told(page: _Page) -> None:
+def test_the_page_declares_its_language(page: _Page) -> None:
     assert page.elements[0] == ("html", {"lang": "en"})
     assert len(page.all("title")) == len(page.all("main")) == len(page.all("h1")) == 1
 
@@ -106,7 +106,7 @@ def test_both_pages_say_the_same() -> None:
                 assert cell_text in words, cell_text
 
 
-def test_what_looks_like_a_tag_is_text() -> None:
+def test_tags_in_texts_are_escaped() -> None:
     blocks = (
         Heading("<b>"), Paragraph("<script>alert(1)</script>"), Paragraph("**yes** `a<b`", marked=True),
         Bullets("x", ["<i>"]), Code("a && b"), Illustration("p", 'a "picture"'),

@@ -176,7 +176,7 @@ def mounts_of(front: dict[str, Any], rear: Any = OPEN) -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("side", ["min", "max"])
-def test_what_is_not_minimised_is_asked_for_at_edges(side: str) -> None:
+def test_limits_that_cannot_be_minimised_are_bisected(side: str) -> None:
     """Natural frequencies under a sag, against a grid of both stiffnesses."""
     sides = {"min": "1 Hz", "max": "500 Hz"} | {side: "12 Hz"}
     limits = [limit("static sag", max="1 mm"), limit("natural frequencies", **sides)]
@@ -261,7 +261,7 @@ def test_a_design_that_was_overlooked_is_the_result() -> None:
         assert not found.reached
 
 
-def test_what_a_search_failed_at_is_infeasible_where_the_bound_says_so() -> None:
+def test_a_failed_search_is_infeasible_by_its_bound() -> None:
     found = told_of(problem_of([LIGHT, QUIET]), Status.FAILED)
     assert found.status is Status.INFEASIBLE
     assert set(found.conflict) == {"light", "quiet"}
@@ -313,7 +313,7 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     assert "contradict" in none.message
 
 
-def test_what_nothing_open_changes_stays() -> None:
+def test_a_limit_without_open_numbers_keeps_its_value() -> None:
     shaft = {"name": "s", "ratio": 1, "position": ["90 mm", "-90 mm"],
              "unbalances": [{"x": "0 mm", "unbalance": "1e-3 kg m", "radius": "30 mm"}]}  # fmt: skip
     problem = problem_of([limit("envelope radius", max="50 mm"), LIGHT], balancer_shafts=[shaft])

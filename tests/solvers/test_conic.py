@@ -133,7 +133,7 @@ def contradicted() -> AffineProblem:
     return AffineModel(replace(problem, limits=(*problem.limits, minimum))).at(96)
 
 
-def test_contradiction_is_told() -> None:
+def test_contradicting_limits_have_no_solution() -> None:
     assert solve_cones(contradicted()).x is None
 
 
@@ -230,7 +230,7 @@ orders = [2]
         ),
     ],
 )
-def test_what_is_balanced_but_for_rounding(throws: list[float], objective: str, upper: float, tmp_path: Path) -> None:
+def test_loads_at_rounding_level_are_proven(throws: list[float], objective: str, upper: float, tmp_path: Path) -> None:
     """Nothing to gain, in loads of 1e-12 N beside those of bounds of any size: an optimum, and proven."""
     problem = loaded(tmp_path, BALANCED.format(throws=throws, upper=upper, asked=objective))
     result = laufruhe.solve(problem)

@@ -89,7 +89,7 @@ def test_two_weights_in_one_place_are_free_against_each_other(name: str) -> None
         assert high == pytest.approx(min(whole, maximum), abs=5e-3 * whole)
 
 
-def test_what_the_objective_does_not_feel_is_free_from_bound_to_bound() -> None:
+def test_a_decision_without_effect_is_free_from_bound_to_bound() -> None:
     """A weight on the crank makes no force of second order."""
     result = laufruhe.solve(problem_of("rms mount force", [web("web")], {"orders": [2]}))
     assert ends_of(result)["web.mass"] == pytest.approx((0.0, 2.0), abs=1e-6)
@@ -152,7 +152,7 @@ def holding(problem: Problem, k: int, size: float) -> Problem:
 
 
 @pytest.mark.slow
-def test_nothing_is_told_where_it_is_not_looked_at() -> None:
+def test_unchecked_results_claim_no_free_decisions() -> None:
     assert solve(problem_of("mean mount force", TWINS)).free is None
     moving = load(PROBLEMS / "tractor-four-shaft-heights.toml")
     found = solve(replace(problem_of("mean mount force", TWINS)))

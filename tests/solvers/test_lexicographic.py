@@ -191,7 +191,7 @@ def test_refusals(old: str, new: str, said: str, tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_first_that_nothing_meets_is_told_as_of_one(tmp_path: Path) -> None:
+def test_an_infeasible_first_rank_is_infeasible(tmp_path: Path) -> None:
     limited = TWO + '[[constraints]]\nlimit = "maximum shaking force"\nmax = "1 N"\n'
     assert solve(loaded(tmp_path, limited)).status is Status.INFEASIBLE
 
@@ -204,7 +204,7 @@ def test_a_trade_is_of_the_first_objective(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("samples", [48, 60, 72])
-def test_what_a_rank_gives_up_is_read_at_many_angles(samples: int) -> None:
+def test_the_value_of_an_earlier_rank_is_read_at_many_angles(samples: int) -> None:
     """The last rank is proven at few angles, which misread the mean of the first by up to 0.3 %."""
     problem = load(
         {

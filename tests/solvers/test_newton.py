@@ -153,7 +153,7 @@ def wrong_end(program: NewtonProgram, x: np.ndarray, directions: Any = None) -> 
 @pytest.mark.parametrize(
     "broken", [("derivatives", wrong_gradient), ("steps", wrong_end), ("minimise", lambda *_: None)], ids=lambda b: b[0]
 )
-def test_what_it_cannot_prove_it_does_not_claim(
+def test_newton_returns_nothing_without_a_proof(
     kind: str, broken: tuple[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = SCENES[kind](0)

@@ -49,7 +49,7 @@ def test_a_start_whose_time_is_over_stops_where_it_is_and_the_next_does_not():
     assert solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])])[0].usable
 
 
-def test_where_starts_ended_is_said_in_plain_words():
+def test_the_ends_of_starts_are_described():
     """Also where none converged, or there was one start alone."""
     starts = [np.array([-1.0, 1.0]), np.array([0.5, 0.5])]
     stopped = solve_nonlinear(rosenbrock(), starts, max_seconds=0.0)
@@ -76,7 +76,7 @@ def test_no_later_stage_is_begun_after_the_time():
     assert cut.x == pytest.approx(whole.x, abs=1e-6)
 
 
-def test_where_a_start_is_at_an_optimum_is_told_by_its_residual_not_by_the_solver():
+def test_an_optimum_is_recognised_by_its_residual():
     """Check that a start one iteration short of the solver's tolerance counts by its residual."""
     whole = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])])[0]
     cut = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])], max_iterations=whole.iterations - 1)[0]
@@ -187,7 +187,7 @@ def waves(softness: float = 0.0) -> NonlinearProgram:
     )  # fmt: skip
 
 
-def test_of_starts_with_one_end_one_goes_on_and_no_better_optimum_is_lost():
+def test_one_of_equal_starts_goes_on_and_no_optimum_is_lost():
     """Check that starts left in the first stage end no better than the best optimum."""
     starts = spread_starts(np.array([-4.0]), np.array([4.0]), 24)
     found = solve_nonlinear(waves(0.3), starts, workers=1, stop_when=lambda optima: False)
@@ -205,7 +205,7 @@ def test_of_starts_with_one_end_one_goes_on_and_no_better_optimum_is_lost():
     assert 0 < stayed < len(apart) - 1
 
 
-def test_what_follows_from_the_rest_tells_no_ends_apart():
+def test_dependent_variables_distinguish_no_optima():
     """Its sign may be either, as that of the shape of a mode."""
     x, e = ca.SX.sym("x", 2), ca.SX.sym("e")
     program = NonlinearProgram(

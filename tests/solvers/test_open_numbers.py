@@ -115,7 +115,7 @@ def test_every_value_is_that_of_a_file_with_it(stroke: float, offset: float, sha
     assert forces[0] == pytest.approx(_rms_mount_force(stroke, offset, share), rel=1e-6)
 
 
-def test_what_follows_in_the_file_follows_an_open_number(tmp_path: Path) -> None:
+def test_dependent_keys_follow_an_open_number(tmp_path: Path) -> None:
     """Spacing moves the throws, a speed the loads, and places of rigid mounts what they carry."""
     text = changed(ASIDE, "throws = [0]", 'throws = [0, 180]\ncylinder_spacing = { between = ["90 mm", "120 mm"] }')
     problem = loaded(tmp_path, text)
@@ -165,7 +165,7 @@ def test_limits_are_kept_by_what_is_searched() -> None:
         ("offset = {", "ofset = {", "is not a key here"),
     ],
 )  # fmt: skip
-def test_what_stays_closed_is_told_in_a_line_with_its_reason(old: str, new: str, said: str, tmp_path: Path) -> None:
+def test_keys_that_cannot_be_open_are_refused_with_a_reason(old: str, new: str, said: str, tmp_path: Path) -> None:
     line = complaint_about(written(tmp_path, changed(ASIDE, old, new)))
     assert said in line
     assert "\n" not in line

@@ -204,7 +204,7 @@ def test_infeasible_names_the_limits_in_conflict_and_no_others() -> None:
 
 
 @pytest.mark.parametrize("samples", [48, 180])
-def test_a_limit_that_only_finer_angles_contradict_is_told(samples: int) -> None:
+def test_a_limit_broken_only_at_finer_angles_is_a_conflict(samples: int) -> None:
     """A largest roll moment that nothing open changes, a hair under its peak: met at many angles, not between.
 
     The limit in conflict is named alone, and one at the peak itself is met.
@@ -221,7 +221,7 @@ def test_a_limit_that_only_finer_angles_contradict_is_told(samples: int) -> None
     assert solve(replace(p, limits=(mass, Limit("roll", roll, peak)))).status is Status.OPTIMAL
 
 
-def test_of_equal_designs_the_lightest() -> None:
+def test_the_lightest_of_equal_designs_is_returned() -> None:
     """Counterweights that no mount feels stay off, shafts that can share do not fight each other."""
     rotors = [shaft_rotor("left", 2, 0.0, 0.1), shaft_rotor("right", -2, 0.0, -0.1)]
     rotors += [web("a", 0.2), web("b", -0.2), web("c", 0.0)]

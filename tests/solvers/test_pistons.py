@@ -176,7 +176,7 @@ def test_masses_at_an_uneven_speed_are_decided_locally(tmp_path: Path) -> None:
         VEE + '[flywheel]\ninertia = { between = ["0.1 kg m^2", "1 kg m^2"] }\n' + objective("degree of irregularity"),
     ],
 )
-def test_what_no_method_knows_is_searched(text: str, tmp_path: Path) -> None:
+def test_problems_without_a_special_method_are_searched(text: str, tmp_path: Path) -> None:
     """A light piston turns most evenly; of weights that follow its mass the force is least at the lightest too."""
     found = searched(loaded(tmp_path, text))
     assert {d.name.split(".")[-1]: d.value for d in found.decisions}.popitem() is not None

@@ -51,7 +51,7 @@ def test_leads_keep_limits_over_the_cycle(maximum: float, met: bool) -> None:
     assert not met or with_fine_sampling(result.final).violation(case.limits) <= FEASIBILITY_TOL
 
 
-def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> None:
+def test_a_constant_limit_is_judged_at_many_angles() -> None:
     """The cycle has 964.63 N of second order, 48 angles have 959.1 N."""
     limit = {"name": "second", "limit": "mean shaking force", "orders": [2], "max": "962 N"}
     case = problem({}, objective={"minimise": "rms shaking force"}, constraints=[limit])

@@ -27,7 +27,7 @@ def test_counterweights_and_shafts_are_decided_with_no_library_but_the_solver_of
 
 
 @pytest.mark.slow
-def test_who_draws_is_ready_without_what_studies_and_solvers_need() -> None:
+def test_drawing_imports_no_library_of_studies_and_solvers() -> None:
     names = "casadi", "clarabel", "cvxpy", "pandas", "pydantic", "scipy", "xarray"
     code = f"import sys; sys.modules |= dict.fromkeys({names}); from laufruhe.plots import get_ready; get_ready()"
     subprocess.run([sys.executable, "-c", code], check=True)

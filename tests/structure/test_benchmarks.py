@@ -26,7 +26,7 @@ def ran(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.slow
-def test_scripts_can_be_imported_and_a_study_too_small_to_tell_growth_is_refused():
+def test_scripts_can_be_imported_and_too_small_studies_are_refused():
     """A hundredth of four scenes was none, and its study failed after minutes."""
     names = ", ".join(sorted(path.stem for path in SCRIPTS.glob("*.py")))
     done = ran("-c", f"import {names}; bench_cluster.main()", "--solves", "4")

@@ -42,7 +42,7 @@ def test_a_run_lists_what_took_longer(timer: CoreSeconds) -> None:
     assert listed_now() == [f"{OWN}[not run]", f"{OWN}[now slow]"]
 
 
-def test_what_is_listed_is_marked_unless_it_is_measured_anew(timer: CoreSeconds) -> None:
+def test_listed_tests_are_slow_unless_they_are_measured(timer: CoreSeconds) -> None:
     for relist in (None, "more", "anew"):
         marked: list[str] = []
         items: Any = [
@@ -66,7 +66,7 @@ def test_a_listed_long_test_has_a_cheaper_one_that_make_test_runs() -> None:
             assert all(listed[name].isdecimal() and name == shorter for name in names), shorter
 
 
-def test_of_a_family_so_many_cases_stay() -> None:
+def test_cases_of_a_family_stay_at_equal_steps() -> None:
     assert left_out(range(10), 3) == [1, 2, 4, 5, 7, 8, 9]
     assert left_out(range(2), 3) == []
 

@@ -88,7 +88,7 @@ def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
     "content", [b"", b"\n\n", b"\x00" * 99, b"\xff\xfe\n", b"[" * 5000 + b"\n", b"1\n", b'{"half": \n', b"null\n",
                 b'["a", 1, {}]\n', b'["' + b"0" * 32 + b'", 0.25, {"objective": 1.0}]\n', b"9" * 5000 + b"\n"],
 )  # fmt: skip
-def test_what_is_no_point_is_passed_over(tmp_path: Path, content: bytes) -> None:
+def test_invalid_points_are_skipped(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / FINISHED_POINTS
     path.write_bytes(content)
     assert trusted(path) == []

@@ -130,7 +130,7 @@ def drawn(rng: random.Random, folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("seed", first_fast(range(24), 0, long=(0, 3, 4, 6, *range(8, 24))))
-def test_a_random_study_is_computed_told_and_drawn(seed: int, tmp_path: Path) -> None:
+def test_a_random_study_has_points_tables_and_pictures(seed: int, tmp_path: Path) -> None:
     rng = random.Random(seed)
     study = drawn(rng, tmp_path)
     (part,) = study["study"]["parts"]

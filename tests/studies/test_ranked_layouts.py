@@ -62,7 +62,7 @@ def data() -> xr.Dataset:
     return part.dataset(points, [part.answer(point, problem_files) for point in points])
 
 
-def test_what_looks_equal_on_the_page_has_one_place() -> None:
+def test_values_equal_on_the_page_share_a_place() -> None:
     values = np.array([262.678125, 262.678129, 263.0196, math.nan, 1000.0])
     assert _places(values) == [1, 1, 3, 0, 4]
 

@@ -332,7 +332,7 @@ def test_cores_change_nothing(tmp_path: Path, small: Path, pool_at_once: None) -
 
 
 @pytest.mark.slow
-def test_what_a_worker_refuses_is_one_line(tmp_path: Path, small: Path, pool_at_once: None) -> None:
+def test_an_error_of_a_worker_is_one_line(tmp_path: Path, small: Path, pool_at_once: None) -> None:
     """In the middle of this sweep the cycle cannot be met; its ends were tried before."""
     values = '["9 kp/cm^2", "8 kp/cm^2", "400 kp/cm^2", "7 kp/cm^2", "6 kp/cm^2"]'
     path = study(tmp_path, part("counterweight fraction", ["single"], swept("gas.imep", f"values = {values}")))

@@ -171,7 +171,7 @@ def test_refused_in_one_line_and_nothing_left(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["s.toml"]
 
 
-def test_what_a_case_names_anew_is_swept_by_its_new_name(tmp_path: Path) -> None:
+def test_a_renamed_part_is_swept_by_its_new_name(tmp_path: Path) -> None:
     named = 'set = { "counterweights.web.name" = "inner" }'
     (tmp_path / "s.toml").write_text(
         study(sweep=swept("counterweights.inner.balance_factor", "values = [0, 1]")) + named
@@ -334,7 +334,7 @@ def test_a_table_may_replace_a_number_of_all_parts(tmp_path: Path) -> None:
         assert load_study(path).study.parts[0].name == "p"
 
 
-def test_every_bad_expression_is_told_by_its_place(tmp_path: Path) -> None:
+def test_every_bad_expression_is_named_with_its_place(tmp_path: Path) -> None:
     """Check one line for each bad expression: key, value, rule and nearest name."""
     panel = 'picture = { panels = [{ title = "{m:d}", curves = [{ y = "mean[\'givn\'] / m" }] }] }\nquantities'
     path = tmp_path / "s.toml"

@@ -181,7 +181,7 @@ def test_loads_are_those_of_rigid_bodies(five: Problem) -> None:
             assert our_roll == pytest.approx(roll, rel=1e-9, abs=1e-9 * abs(force) * RADIUS)
 
 
-def test_pins_and_walls_feel_what_rigid_bodies_do(five: Problem) -> None:
+def test_forces_on_pins_and_walls_are_those_of_rigid_bodies(five: Problem) -> None:
     """Knuckle pins, the crank pin under the master rod, and the walls, of masses and of gas (B11)."""
     star, engine = star_of(five.engine), five.engine
     point, turning = replace(five.points[0], gas=None), 1j * RADIUS * SPEED
@@ -415,7 +415,7 @@ def test_an_open_order_is_the_one_that_is_nearest_to_even(tmp_path: Path) -> Non
         ("cylinders = 5", 'cylinders = 5\nthrows = "open"', "use layout inline or vee"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_impossible_radial_engines_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises(InputError, match=re.escape(message)):
         loaded(tmp_path, changed(TEXT, old, new))
 

@@ -69,7 +69,7 @@ def test_a_usual_engine_raises_none() -> None:
         ("0.03 kg m", "30 kg m", "unbalance of web = 30 kg m"),
     ],
 )
-def test_what_is_out_of_the_usual_is_told_with_what_to_check(old: str, new: str, said: str) -> None:
+def test_unusual_numbers_are_reported_with_a_remedy(old: str, new: str, said: str) -> None:
     found = [doubt for doubt in doubted(old, new) if said in doubt]
     assert len(found) == 1
     assert "; check" in found[0]
@@ -81,7 +81,7 @@ def test_an_open_mass_may_start_anywhere() -> None:
 
 
 @pytest.mark.parametrize("order_line", ["", "firing_order = [1, 10, 5, 7, 2, 8, 3, 9, 4, 6]", "fires_together = true"])
-def test_throws_without_a_firing_order_are_asked_about(order_line: str) -> None:
+def test_throws_without_a_firing_order_are_reported(order_line: str) -> None:
     """A V10 whose throws leave every cylinder at its first dead centre: all fire in one turn of two."""
     vee = 'layout = "vee"\nbank_angle = 90\ncylinder_spacing = "98 mm"'
     engine = SINGLE.replace('layout = "inline"', vee).replace(
@@ -113,7 +113,7 @@ def test_a_decimal_comma_is_known_from_a_list(text: str, is_one: bool) -> None:
     assert bool(DECIMAL_COMMA.match(text)) is is_one
 
 
-def test_a_number_without_quotes_is_told_from_other_toml() -> None:
+def test_a_number_without_quotes_has_its_own_remedy() -> None:
     for given, remedy in (("90 mm", 'in quotes, as in "90 mm"'), ('90 mm"', 'in quotes, as in "90 mm"'),
                           ("0,28", "decimals follow a point, as in 0.28"), ("[90,", "add ]")):  # fmt: skip
         with pytest.raises(InputError) as caught:

@@ -86,7 +86,7 @@ def answered(*answers: str) -> str:
          {"cylinders": 10, "throws": [0, 144, 216, 288, 72], "firing_order": None}),
     ],
 )  # fmt: skip
-def test_init_asks(here: Path, answers: list[str], keys: dict[str, object]) -> None:
+def test_init_puts_answers_into_the_file(here: Path, answers: list[str], keys: dict[str, object]) -> None:
     found = run.invoke(app, ["init"], input=answered(*answers))
     assert found.exit_code == 0, found.output
     assert load(here / "problem.toml").objective
@@ -130,7 +130,9 @@ FOUR = ["", "", "", "", "", "1-3-4-2"]
         ([*FOUR, "", "", "", "", "", "", "", "", "", "", "10 bar", "60 bar"], "for example 60 bar", "bore", "80 mm"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_and_asked_again(here: Path, answers: list[str], said: str, key: str, value: object) -> None:
+def test_a_bad_answer_is_explained_and_asked_again(
+    here: Path, answers: list[str], said: str, key: str, value: object
+) -> None:
     found = run.invoke(app, ["init"], input=answered(*answers))
     assert found.exit_code == 0, found.output
     assert said in found.output
@@ -158,7 +160,7 @@ def test_a_throw_carries_the_big_ends_of_all_its_rods(here: Path, answers: list[
     np.testing.assert_allclose(first, second, atol=1e-5 * np.abs(first).max())
 
 
-def test_a_wrong_source_is_asked_again(here: Path) -> None:
+def test_an_unknown_source_is_asked_again(here: Path) -> None:
     found = run.invoke(app, ["init"], input="bmw-b49\n" + answered())
     assert (found.exit_code, "did you mean 'bmw-b48'?" in found.output) == (0, True)
 
@@ -207,7 +209,7 @@ def test_balancer_shafts_turn_as_the_free_loads(here: Path, answers: list[str], 
     assert [shaft["ratio"] for shaft in tables.get("balancer_shafts", [])] == ratios
 
 
-def test_nothing_is_asked_for_a_file_that_is_there(here: Path) -> None:
+def test_an_existing_file_is_refused_before_questions(here: Path) -> None:
     (here / "problem.toml").write_text("mine", encoding="utf-8")
     found = run.invoke(app, ["init"])
     assert (found.exit_code, found.output.count("\n")) == (2, 1)
@@ -239,7 +241,7 @@ def test_a_new_folder_is_made_and_the_next_command_can_be_pasted(here: Path) -> 
         (["examples", "tractor-single", "--to", "file"], "'file' is not a folder); name another place"),
     ],
 )
-def test_what_cannot_be_written_is_refused_before(here: Path, words: list[str], said: str) -> None:
+def test_an_unwritable_path_is_refused_before_questions(here: Path, words: list[str], said: str) -> None:
     (here / "file").write_text("mine", encoding="utf-8")
     found = run.invoke(app, words)
     assert (found.exit_code, found.output.count("\n")) == (2, 1)
@@ -264,7 +266,7 @@ def test_a_full_disk_leaves_nothing_half_written(here: Path, monkeypatch: pytest
     assert list(here.iterdir()) == []
 
 
-def test_what_begins_as_a_study_is_run_as_one(here: Path) -> None:
+def test_a_copied_study_names_the_study_command(here: Path) -> None:
     assert "laufruhe study mine.toml" in run.invoke(app, ["init", "mine.toml", "--from", "tractor-sweeps"]).output
 
 
@@ -295,7 +297,7 @@ def test_engines_are_listed_and_shown() -> None:
         (["init", "--from", "bmw-b49"], "did you mean 'bmw-b48'?"),
     ],
 )
-def test_what_is_not_there_is_refused(here: Path, words: list[str], line: str) -> None:
+def test_an_unknown_engine_or_problem_is_refused(here: Path, words: list[str], line: str) -> None:
     found = run.invoke(app, words)
     assert found.exit_code == 2
     assert line in found.output

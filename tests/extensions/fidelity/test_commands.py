@@ -70,7 +70,7 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_trade_of_several_tells_each_by_its_name(tmp_path: Path) -> None:
+def test_trade_of_several_problems_names_each(tmp_path: Path) -> None:
     paths = [written(tmp_path, text, name) for name, text in (("given", scenes.GIVEN), ("open", scenes.TIGHT))]
     out = tmp_path / "trade.json"
     answer = RUN.invoke(app, ["trade", *map(str, paths), "--out", str(tmp_path / "trade"), "--json", str(out)])

@@ -98,7 +98,7 @@ def test_an_open_flywheel_is_refused_before_anything_is_measured(tmp_path: Path)
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_trade")
-def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_problems_finished_in_time_have_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Measure two problems, of which one runs out of time: an error counts it."""
     quick, never = PROBLEMS / "boxer-four.toml", PROBLEMS / "inline-five.toml"
 
@@ -114,7 +114,7 @@ def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pyt
     assert (tmp_path / "trade/boxer-four.md").is_file()
 
 
-def test_what_a_file_asks_beyond_a_trade_is_told() -> None:
+def test_objectives_beyond_a_trade_are_reported() -> None:
     first = ("Of 2 objectives in order the first is traded.",)
     found = replace(_trade(_row("one", 1.0, 0.0, math.nan)), left_out=first)
     assert first[0] in str(trade_document(found, None, "trade"))

@@ -85,7 +85,7 @@ def test_intervals_hold_true_numbers() -> None:
     assert np.mean(found) > 0.83
 
 
-def test_two_discs_in_one_plane_cannot_be_told_apart() -> None:
+def test_two_discs_in_one_plane_cannot_be_identified() -> None:
     text = READY.read_text().replace('x = "-190 mm"', 'x = "170 mm"')
     text = text.replace('{ between = ["0.4 kg", "0.8 kg"], start = "0.55 kg" }', '"0.61 kg"')
     text = text.replace('{ between = ["100 N/mm", "600 N/mm"], start = "250 N/mm" }', '"310 N/mm"')
@@ -125,7 +125,7 @@ def test_command_estimates_the_built_twin(tmp_path: Path) -> None:
         ('name = "rear"\n', 'name = "back"\n', "has a column 'rear"),
     ],
 )
-def test_what_cannot_be_read_is_one_line(tmp_path: Path, old: str, new: str, line: str) -> None:
+def test_unreadable_measurements_are_refused_in_one_line(tmp_path: Path, old: str, new: str, line: str) -> None:
     for csv in PROBLEMS.glob("built-twin-*.csv"):
         shutil.copy(csv, tmp_path)
     text = READY.read_text()

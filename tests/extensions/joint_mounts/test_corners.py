@@ -85,7 +85,7 @@ def test_a_corner_is_proven_as_closely_whatever_the_weights() -> None:
 
 
 @pytest.mark.parametrize("seed", first_fast((780004, 780001, 780000), 2))
-def test_what_multipliers_say_in_a_box_is_a_polynomial_and_a_rest(seed: int) -> None:
+def test_multipliers_in_a_box_are_a_polynomial_and_a_remainder(seed: int) -> None:
     problem, generator = joint(seed), np.random.default_rng(seed)
     boxes, near_rest = DesignBoxes(problem, math.inf, lambda *_: math.inf), 0.0
     for lower, upper in boxes_of(problem, generator, 5, 0.25):
@@ -150,7 +150,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
     assert informative >= 2
 
 
-def test_a_budget_of_corners_that_is_spent_asks_for_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_spent_budget_computes_no_more_corners(monkeypatch: pytest.MonkeyPatch) -> None:
     """Halves of a box are then bounded by the corners that are known."""
     problem = joint(780003)
     boxes = DesignBoxes(problem, math.inf, lambda *_: math.inf)
@@ -188,7 +188,7 @@ CROSSED = {
 
 
 @pytest.mark.parametrize("kind", first_fast(CROSSED, 0))
-def test_what_is_asked_may_be_crossed(kind: str) -> None:
+def test_objectives_and_limits_may_mix_corners(kind: str) -> None:
     table, rng = random_problem("joint", 780004)
     terms, limits = CROSSED[kind]
     table["objective"] = objective([{"quantity": name, "weight": weight} for name, weight in terms])

@@ -105,7 +105,7 @@ def test_halves_find_the_best_of_all_stars(cylinders, name, gas, tmp_path):
 
 
 @pytest.mark.slow
-def test_weights_on_single_throws_are_told_by_no_couple(tmp_path):
+def test_weights_on_single_throws_have_no_couple_norms(tmp_path):
     weights = '[[counterweights]]\nname = "w"\nx = "200 mm"\nunbalance = "0.02 kg m"\nangle = 40\n'
     problem, family = problem_of_norm(tmp_path, 6, "two-stroke", "mean", False, rest=weights)
     assert norms_of(problem, family) is None

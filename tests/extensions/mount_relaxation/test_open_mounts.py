@@ -83,7 +83,7 @@ def test_limits_on_frequencies_are_those_of_the_stiffness(tmp_path: Path) -> Non
     assert len(seen) >= 2
 
 
-def test_a_total_stiffness_outside_is_told_as_a_share_of_its_limit(tmp_path: Path) -> None:
+def test_a_forbidden_band_of_total_stiffness_is_a_share_of_its_limit(tmp_path: Path) -> None:
     """Compare violations of a forbidden band of total stiffness with traces, in boxes of no width."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS, LIMITS.replace("natural frequencies", "static sag")
                          .replace('min = "4 Hz"\n', "").replace("16 Hz", "1 m"))  # fmt: skip

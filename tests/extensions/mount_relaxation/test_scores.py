@@ -16,7 +16,7 @@ from laufruhe.solvers import solve
 
 @pytest.mark.parametrize("lacking", [0.0, -1e-9, 5e-324, 1e-310])
 @pytest.mark.parametrize("size", [5e-324, 1e-305, 1.0, 1e9, 1e300])
-def test_sides_are_told_apart_where_nothing_is_lacking(lacking: float, size: float) -> None:
+def test_scores_are_finite_without_a_lack(lacking: float, size: float) -> None:
     """Zero and the least numbers there are: no share overflows, which would be an error here, nor is one lost."""
     hidden = size * np.array([0.0, 0.5, 1.0])
     for pull in (np.zeros(3), np.array([5e-324, 0.0, 0.0])):
@@ -25,7 +25,7 @@ def test_sides_are_told_apart_where_nothing_is_lacking(lacking: float, size: flo
         assert found[2] == found.max() > 0.0
 
 
-def test_what_is_hidden_counts_by_what_is_lacking() -> None:
+def test_hidden_scores_are_weighted_by_the_lack() -> None:
     pull, hidden = np.array([4.0, 1.0]), np.array([0.0, 3.0])
     assert joint_scores(pull, hidden, 6.0) == pytest.approx([1.0, 3.0 / (6.0 * WORTH)])
 

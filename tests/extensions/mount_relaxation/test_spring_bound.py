@@ -454,7 +454,7 @@ def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
                 assert mean < 1.3 * factor * np.linalg.norm(forces[1])
 
 
-def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
+def test_no_force_of_a_high_order_exceeds_its_line() -> None:
     """E62: forces by solving anew, with an inclination and a place open; of both halves and of all motions."""
     problem = load(POWERTRAIN.with_name("tractor-four-elastic.toml"))
     boxes, generator = asked_of(problem), np.random.default_rng(6)
@@ -622,7 +622,7 @@ def test_a_place_behind_the_middle_is_narrowed_at_both_ends(tmp_path: Path) -> N
     assert better.min() - 0.02 < box[0][0] <= better.min() < better.max() <= box[1][0] < better.max() + 0.02
 
 
-def test_no_design_on_hydraulic_mounts_moves_more_than_is_told() -> None:
+def test_no_response_on_hydraulic_mounts_exceeds_its_bound() -> None:
     """Above all modes, at the stiffest corner: the load of the highest mode, and others, by solving for the motion."""
     problem = load(POWERTRAIN.with_name("powertrain-hydraulic.toml"))
     generator, chosen = np.random.default_rng(2), tuple(range(len(problem.engine.mounts)))
@@ -647,7 +647,7 @@ def test_no_design_on_hydraulic_mounts_moves_more_than_is_told() -> None:
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
-def test_what_is_a_share_of_a_norm_may_be_so_much_larger(share: float, tmp_path: Path) -> None:
+def test_a_share_of_a_norm_is_cut_off_at_the_norm_over_the_share(share: float, tmp_path: Path) -> None:
     """Check that a root with a share of the norm is cut off at the norm over this share."""
     boxes = asked_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + OBJECTIVES["rms"]))
     ((variable,), *_), look = boxes._variables, boxes._box(0, boxes.lower, boxes.upper)

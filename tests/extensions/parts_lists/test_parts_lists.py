@@ -225,7 +225,7 @@ def test_bad_lists_are_refused_in_one_line(read: Callable[..., Problem], rows: s
         ('[robust]\nover = "worst case"\n[tolerances]\nresidual_unbalance = "50 g cm"\n', CHOICE, "not supported"),
     ],
 )
-def test_what_is_not_supported_is_refused_in_one_line(
+def test_unsupported_parts_lists_are_refused_in_one_line(
     read: Callable[..., Problem], text: str, choice: str, words: str
 ) -> None:
     with pytest.raises(LaufruheError) as error:

@@ -250,7 +250,7 @@ def test_limits_that_no_angle_keeps_are_named(tmp_path: Path) -> None:
         ('"rms mount force"', '"mean main-bearing force"', "no objective or limit depends on it"),
     ],
 )  # fmt: skip
-def test_what_is_not_decided_with_leads_is_told(old: str, new: str, said: str, tmp_path: Path) -> None:
+def test_unsupported_quantities_with_leads_are_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
     text = changed(BARE, "[objective]", JOURNALS + "[objective]")
     with pytest.raises((InputError, ModelError)) as caught:
         solve(loaded(tmp_path, changed(text, old, new)))

@@ -53,7 +53,7 @@ def pair(ahead: float, ratio: float, rods: tuple[float, float], radii: tuple[flo
 
 
 @pytest.mark.parametrize("seed", [*range(6), 7, 9])
-def test_torque_changes_by_no_more_than_is_told(seed: int) -> None:
+def test_torque_changes_by_no_more_than_its_bound(seed: int) -> None:
     """Check that the torque at every lead of a box differs by no more than the bound, which is tight."""
     random = np.random.default_rng(seed)
     cycle = (Cycle.TWO_STROKE, Cycle.FOUR_STROKE)[seed % 2]
@@ -90,7 +90,7 @@ def two_speeds(quantity: str) -> Problem:
 
 
 @pytest.mark.parametrize("norm", ["rms", "mean", "maximum", "peak to peak"])
-def test_a_torque_at_either_point_changes_a_norm_by_no_more_than_is_told(norm: str) -> None:
+def test_a_torque_changes_a_norm_by_no_more_than_its_bound(norm: str) -> None:
     """A torque that only works at one point, or at both, with no load beside it: its norm is its change."""
     own = two_speeds(f"{norm} roll moment")
     (measure,), random = own.measures, np.random.default_rng(4)
@@ -169,7 +169,7 @@ def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
 
 
 @pytest.mark.slow
-def test_gas_that_is_not_felt_hinders_no_lead() -> None:
+def test_gas_without_a_net_force_leaves_leads_decidable() -> None:
     """Its forces close inside: the shaking force is decided beside weights, as without gas."""
     tables = {key: READY[key] for key in ("counterweights",)}
     with_gas, without = (
@@ -203,7 +203,7 @@ def test_a_lead_moves_the_mean_torque_that_arms_hand_on(start: float) -> None:
         ({"gas": {"model": "wiebe", "imep": "7 bar", "start": -8, "duration": 60}}, "rms roll moment", "seiliger"),
     ],
 )
-def test_what_is_not_known_of_shared_chambers_is_one_line(more: dict[str, Any], quantity: str, words: str) -> None:
+def test_unsupported_quantities_of_shared_chambers_are_refused(more: dict[str, Any], quantity: str, words: str) -> None:
     with pytest.raises(ModelError, match=words) as caught:
         laufruhe.solve(problem(quantity, between(0, 40), **more))
     assert len(str(caught.value).splitlines()) == 1

@@ -194,7 +194,7 @@ def test_a_full_disk_is_one_line_and_the_study_goes_on(tmp_path: Path, monkeypat
         ),
     ],
 )
-def test_what_is_wrong_is_one_line(tmp_path: Path, keys: str, problem: str, said: str) -> None:
+def test_bad_keys_of_random_studies_are_refused_in_a_line(tmp_path: Path, keys: str, problem: str, said: str) -> None:
     with pytest.raises(InputError, match=said) as caught:
         computed(tmp_path, keys, problem)
     assert "\n" not in str(caught.value)

@@ -76,7 +76,7 @@ READY = {
 
 
 @pytest.mark.parametrize("name", first_fast(READY, 0))
-def test_least_mount_force_is_not_what_is_felt_least(name: str) -> None:
+def test_least_mount_force_is_not_least_response(name: str) -> None:
     """Both designs have the figures of the page of receivers."""
     path, (best, other) = PROBLEMS / f"{name}.toml", READY[name]
     problem = laufruhe.load(path)

@@ -103,7 +103,7 @@ CHAIN = {10.0: (1.3100, 3.054e-4, 2.3316e-4), 25.0: (0.3418, 2.801e-5, 8.1949e-5
 
 
 @pytest.mark.parametrize("frequency", CHAIN)
-def test_a_seat_on_a_cab_feels_the_force_on_rigid_ground(frequency: float) -> None:
+def test_a_seat_on_a_cab_responds_to_the_force_on_rigid_ground(frequency: float) -> None:
     """Engine 180 kg, cab 450 kg and driver 75 kg in a vertical chain, by its own three equations of motion."""
     w = math.tau * frequency
     k1, k2, k3 = 1.0233e6 * (1.0 + 0.1j), 1.8653e5 + 2969.0j * w, 6662.0 + 424.1j * w

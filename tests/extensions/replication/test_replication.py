@@ -77,7 +77,7 @@ class TestExpressions:
         "x := 3", "{1: 2}", "max(*throws)", "x @ x", "b'a'", "None", "1j", "throws[0:2]", "(x, x)", "Add(x, x)",
         "'{0.__class__}'.format(x)", "'{}'.format(x)", "max.__globals__", "y['a'].values", "[max][0](x)",
     ])  # fmt: skip
-    def test_what_is_no_arithmetic_is_refused(self, text: str) -> None:
+    def test_expressions_beyond_arithmetic_are_refused(self, text: str) -> None:
         with pytest.raises(ExpressionError):
             value_of(text, NAMES)
 
@@ -280,7 +280,7 @@ def test_second_order_couple_of_five_cylinders(worth: Callable[..., Any]) -> Non
     ({"bars": {"filled": "[1]", "labels": ["a"], "for": {"k": [0, 1]}}}, "cannot be drawn: list index out of range"),
     ({"x": {"names": "{mean['one']}"}}, "cannot be drawn"),
 ])  # fmt: skip
-def test_what_cannot_be_drawn_is_told_in_a_line(panel: dict[str, Any], said: str) -> None:
+def test_a_panel_that_cannot_be_drawn_is_named(panel: dict[str, Any], said: str) -> None:
     part = _part(cases=[{"name": "one", "problem": "web"}], picture={"panels": [panel]})
     with pytest.raises(ModelError) as found:
         Replication.picture(_data(part))
@@ -309,7 +309,7 @@ def test_every_colour_is_one_of_the_pictures() -> None:
 
 
 @pytest.mark.parametrize("within", ["5", "five %", "-5 %", "%"])
-def test_what_is_allowed_is_a_number_or_a_share(within: str) -> None:
+def test_a_tolerance_is_a_number_or_a_share(within: str) -> None:
     with pytest.raises(ValueError, match="within"):
         _judged(**{"is": 1, "within": within})
 

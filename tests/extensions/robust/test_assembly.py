@@ -125,7 +125,7 @@ def test_one_line_for_what_is_wrong(read: Read, more: str, rule: str) -> None:
     assert rule in complaint.rule
 
 
-def test_what_is_open_beside_is_refused(read: Read) -> None:
+def test_an_assembly_with_open_numbers_is_refused(read: Read) -> None:
     weight = '[[counterweights]]\nname = "w"\nopposite_throw = 1\nunbalance = { between = ["0 kg m", "1 kg m"] }\n'
     text = THREE + POINT + LEAST.format("rms rocking couple") + '[assembly]\npistons = "p.csv"\n' + weight
     with pytest.raises(ModelError, match="without open numbers"):

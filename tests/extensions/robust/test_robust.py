@@ -273,7 +273,7 @@ def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None
         (TEXT.replace('["60 mm", "-100 mm"]', '[{ between = ["0 mm", "60 mm"] }, "-100 mm"]'), "left.y"),
     ],
 )
-def test_what_is_not_decided_is_refused(read: Callable[[str], Problem], text: str, word: str) -> None:
+def test_unsupported_robust_problems_are_refused(read: Callable[[str], Problem], text: str, word: str) -> None:
     with pytest.raises(ModelError, match=word):
         solve(read(text + ROBUST))
 
@@ -340,7 +340,7 @@ def test_crossed(read: Callable[[str], Problem], text: str) -> None:
         assert value <= worst(found) * (1.0 + 1e-9)
 
 
-def test_what_bends_loads_is_drawn(read: Callable[[str], Problem]) -> None:
+def test_nonlinear_tolerances_are_drawn_at_random(read: Callable[[str], Problem]) -> None:
     """Rod ratio and spacing: the worst of the engines drawn, said to be just that."""
     text = TEXT.replace("rod_ratio = 0.26", 'rod_ratio = "0.26 ± 5 %"').replace('"125 mm"', '"125 mm ± 1 mm"')
     problem = read(text + ROBUST + "engines = 30\n")

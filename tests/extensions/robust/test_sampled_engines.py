@@ -63,7 +63,7 @@ def test_no_bound_is_over_what_an_engine_has(throw: float, samples: int) -> None
     assert heaviest(case) * (1.0 - case.tolerance) <= result.certificate.lower_bound <= heaviest(case) * (1.0 + 1e-9)
 
 
-def test_what_a_share_of_engines_stays_below_is_that_of_many_angles() -> None:
+def test_the_share_of_engines_agrees_with_many_angles() -> None:
     tables = {"objective": SECOND, "robust": {"over": "90 %", "engines": 40}}
     few, many = (solve(problem(**tables, fidelity={"samples": n})) for n in (48, 1440))
     assert few.objective is not None
@@ -80,7 +80,7 @@ def test_the_worst_of_drawn_engines_is_that_of_many_angles() -> None:
     assert few.objective.value == pytest.approx(many.objective.value, rel=1e-4)
 
 
-def test_the_error_told_is_that_of_the_worst_engine() -> None:
+def test_the_error_estimate_is_that_of_the_worst_engine() -> None:
     """Samples are judged on the engine that the objective is of, not on the drawing."""
     case = problem(counterweights=[WEIGHT], objective=SECOND)
     result = solve(case)

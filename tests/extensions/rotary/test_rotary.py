@@ -228,7 +228,7 @@ class TestWeights:
         size = unbalance * result.problem.points[0].speed ** 2
         assert np.abs(wrench[:, [0, 1, 2, 4, 5]]).max() < 1e-6 * size
 
-    def test_of_three_planes_the_far_ones_are_used(self) -> None:
+    def test_the_far_planes_of_three_are_used(self) -> None:
         """The ready problem by linear programming: all in one plane, so that sizes are numbers with a sign."""
         from scipy.optimize import linprog
 

@@ -244,7 +244,7 @@ def test_roots_of_stiffness_are_as_near_as_they_say() -> None:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 5])
-def test_losses_drive_no_more_than_is_told(seed: int) -> None:
+def test_losses_add_energy_at_no_more_than_the_growth_rate(seed: int) -> None:
     """The damping of every design in a box takes energy, or gives no more than the rate that is known."""
     boxes = of_seed(seed)
     of = MotionEquations(boxes.model, RunMatrices(boxes.model), 80.0, boxes.lower, boxes.upper)
@@ -258,7 +258,7 @@ def test_losses_drive_no_more_than_is_told(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", first_fast((2, 5, 0), 2))
-def test_what_moves_a_design_is_as_near_to_its_orders_as_they_say(seed: int) -> None:
+def test_motion_matrices_are_within_the_rest_of_their_expansion(seed: int) -> None:
     """z' = A z of every design in a box: A to the second order, and no entry of the rest over what is told."""
     boxes, scale = of_seed(seed), 80.0
     of = MotionEquations(boxes.model, RunMatrices(boxes.model), scale, boxes.lower, boxes.upper)
@@ -280,7 +280,7 @@ def test_what_moves_a_design_is_as_near_to_its_orders_as_they_say(seed: int) -> 
     assert bent > 1e-6 or not of.maps.bends.any()
 
 
-def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
+def test_the_rest_of_expanded_forces_is_within_its_bound() -> None:
     """Second orders of motion by first ones of forces, bends by both, and a rest that any motion meets."""
     r = np.random.default_rng(8)
     boxes, sides, n, times = 2, 3, 4, 5
@@ -323,7 +323,7 @@ def orders_within(first: Array, second: Array, a: Array, start: Array, load: Arr
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_forces_within_a_step_exceed_those_at_its_ends_by_no_more_than_is_told(seed: int) -> None:
+def test_forces_within_a_step_exceed_its_ends_by_no_more_than_the_bound(seed: int) -> None:
     """Forces of one spring or several, under a load that jumps, are compared with the exact motion."""
     r, n = np.random.default_rng(seed), 1 + seed % 3
     frequency, rates, zeros = r.uniform(2.0, 8.0), r.choice([0.0, 1.0], 3), np.zeros((n, n))
@@ -481,7 +481,7 @@ def test_no_design_of_a_grid_is_under_the_bound(
 
 
 @pytest.mark.slow
-def test_what_no_stiffness_keeps_is_named() -> None:
+def test_a_limit_that_no_stiffness_keeps_is_named() -> None:
     """A little under the least travel there is no design, and the limit is named; a little over it there is one."""
     run = {
         "operating_points": [{"speed": "800 rpm"}],

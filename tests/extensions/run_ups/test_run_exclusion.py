@@ -47,7 +47,7 @@ def limited(seed: int, share: float) -> Problem:
 
 
 @pytest.mark.parametrize("seed", first_fast([10, 6, 9], 0, 1))
-def test_what_is_excluded_no_search_meets(seed: int) -> None:
+def test_no_search_meets_excluded_limits(seed: int) -> None:
     """Limits that random designs keep are not excluded; tighter ones are, and a search breaks them."""
     attainable = limited(seed, 1.02)
     assert not are_contradictory(attainable, attainable.limits)

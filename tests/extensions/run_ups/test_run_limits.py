@@ -95,7 +95,7 @@ def test_run_up_limits_hold_the_proven_optimum(limited: tuple[Problem, Result]) 
 
 
 @pytest.mark.slow
-def test_what_no_design_keeps_is_named() -> None:
+def test_a_run_up_limit_that_no_design_keeps_is_named() -> None:
     result = laufruhe.solve(problem_of(("run-up travel", "0.01 mm"), ("run-up force", "1e6 N")))
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("run-up travel",)

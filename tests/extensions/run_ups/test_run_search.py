@@ -338,7 +338,7 @@ def test_fidelities_of_a_run_up_have_its_loads() -> None:
 
 
 @pytest.mark.slow
-def test_errors_of_run_ups_are_told_and_hold_at_finer_steps() -> None:
+def test_error_estimates_of_run_ups_hold_at_finer_steps() -> None:
     """Check that SciPy's peak lies within the error estimate, and that all orders stay for a run-up."""
     settings = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
     problem = limited(("run-up force", "1 kN"), **settings)
@@ -382,7 +382,7 @@ def test_the_star_that_starts_with_least_travel_is_proven() -> None:
     assert held.limits[0].value <= held.limits[0].limit * (1.0 + 1e-5)
 
 
-def test_what_is_beside_mounts_and_weights_is_checked_alone() -> None:
+def test_run_ups_over_crank_stars_are_refused() -> None:
     """A crank star on open mounts: the search of stars knows nothing of run-ups there, and says so."""
     with pytest.raises(LaufruheError, match="run-up travel is minimised over unbalances and mounts, not over star"):
         laufruhe.solve(limited(objective={"minimise": "run-up travel"}, **three(throws="open", firing_order="open")))

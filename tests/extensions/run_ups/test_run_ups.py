@@ -77,7 +77,7 @@ def test_a_run_up_needs_springs(tmp_path):
 
 
 @pytest.mark.slow
-def test_tables_files_and_picture_tell_of_the_same_run() -> None:
+def test_tables_files_and_picture_show_the_same_run() -> None:
     result = evaluate_only(laufruhe.load(PROBLEMS / "soft-single-run-up.toml"))
     record, sheets = as_dict(result)["run_up"], number_tables(result)
     (grid,) = (grid for grid in tables_of(result) if grid.title == "Through resonance")

@@ -8,7 +8,7 @@ from laufruhe.extensions.run_ups.linear_run import BLOCK
 from laufruhe.extensions.run_ups.stopped_run import _DesignBatch, _followed
 
 
-def test_what_touches_no_stop_goes_on_from_where_it_was() -> None:
+def test_free_steps_are_those_of_the_matrix_exponential() -> None:
     """z_{k+1} = e^{A h} z_k + b_k through several blocks, of two designs side by side."""
     rng = np.random.default_rng(3)
     designs, modes, steps = 2, 3, 3 * BLOCK + 7

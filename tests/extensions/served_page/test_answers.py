@@ -42,7 +42,7 @@ def tight() -> dict[str, Any]:
     return settle(LANCHESTER, edits=(TIGHT,))
 
 
-def test_what_follows_is_an_estimate_of_what_is_proven(tight: dict[str, Any]) -> None:
+def test_the_follower_estimates_the_proven_optimum(tight: dict[str, Any]) -> None:
     found = follow(LANCHESTER, edits=(TIGHT,))
     proven = tight["claim"]
     assert proven["kind"] == "proven"
@@ -58,7 +58,7 @@ def test_what_follows_is_an_estimate_of_what_is_proven(tight: dict[str, Any]) ->
     assert "about " not in tight["limits"][0]["words"]
 
 
-def test_what_is_proven_is_what_the_command_finds(tight: dict[str, Any]) -> None:
+def test_the_proven_answer_is_that_of_the_command(tight: dict[str, Any]) -> None:
     result = laufruhe.solve(load(LANCHESTER).with_values({"constraints.balancer mass.max": "0.5 kg"}))
     assert result.objective is not None
     assert tight["claim"]["value"] == pytest.approx(result.objective.value, rel=1e-9)
@@ -83,7 +83,7 @@ def test_a_model_is_sent_once_and_again_where_loads_are_others() -> None:
         ("deltic-row", "held", "rms shaking force without later objectives"),
     ],
 )
-def test_what_is_left_out_while_sliders_move_is_said(name: str, kind: str, words: str) -> None:
+def test_a_claim_names_what_it_omits_while_sliders_move(name: str, kind: str, words: str) -> None:
     claim = follow(PROBLEMS / f"{name}.toml")["claim"]
     assert (claim["kind"], claim["words"]) == (kind, words)
 
@@ -147,12 +147,12 @@ def test_numbers_that_were_not_offered_are_refused(name: str) -> None:
         {"edits": [["set", "x", {"a": {"b": 1}}]]}, {"position": "1"}, {"position": 1.5}, {"position": True},
     ],
 )  # fmt: skip
-def test_what_no_page_asks_is_refused(given: object) -> None:
+def test_a_malformed_page_state_is_refused(given: object) -> None:
     with pytest.raises(Refused):
         PageState.from_json(given)
 
 
-def test_what_a_page_asks_is_read() -> None:
+def test_a_page_state_is_read() -> None:
     given = {"edits": [["set", "a", "1 kg"]], "held": [["star", "star", {"throws": [0, 180]}]], "design": {"b": 2}}
     state = PageState.from_json(given)
     assert state.edits == (Edit("set", "a", "1 kg"),)

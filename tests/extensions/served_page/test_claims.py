@@ -155,7 +155,7 @@ def test_a_claim_carries_the_position_of_the_settings_that_it_is_about() -> None
     assert found["claim"]["position"] == 42
 
 
-def test_what_is_held_as_decided_is_named() -> None:
+def test_a_claim_names_held_decisions() -> None:
     path = INPUTS / "rank-all-cranks.toml"
     names = [decision.name for decision in load(path).decisions if not decision.is_affine]
     held = tuple(Edit("fix", name, f"{-200 if name.endswith('z') else 100 * (1 - 2 * ('right' in name))} mm")
@@ -218,7 +218,7 @@ def test_no_ready_problem_claims_more_than_an_estimate_while_it_is_followed(shar
                 assert claim["value"] == pytest.approx(exact(path, found["design"]), rel=1e-9), path.stem
 
 
-def test_the_exact_model_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_exact_model_is_evaluated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The value, all limits and the drawing of a design come from one evaluation."""
     state = []
     monkeypatch.setattr(page_problem, "evaluate", lambda *given: state.append(given) or evaluate(*given))

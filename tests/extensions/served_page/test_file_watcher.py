@@ -32,7 +32,7 @@ def watched(tmp_path: Path) -> Iterator[FileWatcher]:
     made.close()
 
 
-def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: FileWatcher) -> None:
+def test_a_bad_file_leaves_the_last_good_state(watched: FileWatcher) -> None:
     first = watched.source
     saved(watched.path, TEXT.replace('"2500 rpm"', "2500 rpm"))
     assert watched.later(1, PATIENCE) == 2
@@ -51,13 +51,13 @@ def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: 
     assert "does not exist" in watched.complaint
 
 
-def test_who_waits_is_let_go_when_nothing_is_served_any_more(watched: FileWatcher) -> None:
+def test_a_closed_watcher_releases_waiting_requests(watched: FileWatcher) -> None:
     watched.close()
     assert watched.later(watched.version, PATIENCE) == watched.version
     assert watched.is_closed
 
 
-def test_what_cannot_be_read_is_not_served(tmp_path: Path) -> None:
+def test_an_unreadable_file_is_not_served(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         FileWatcher(tmp_path / "missing.toml")
 

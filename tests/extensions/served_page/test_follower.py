@@ -54,7 +54,7 @@ def test_a_limit_that_no_design_keeps_is_named(follower: Follower) -> None:
     assert found.values == ()
 
 
-def test_what_loads_are_not_affine_in_is_not_followed() -> None:
+def test_problems_with_loads_that_are_not_affine_are_not_followed() -> None:
     for name in (
         "tractor-four-elastic",
         "vee-eight-open",
@@ -65,7 +65,7 @@ def test_what_loads_are_not_affine_in_is_not_followed() -> None:
         assert not can_follow(load(PROBLEMS / f"{name}.toml"))
 
 
-def test_masses_of_pistons_are_followed_where_inertias_are_not_felt() -> None:
+def test_piston_masses_are_followed_if_rod_inertia_has_no_effect() -> None:
     problem = load(PROBLEMS / "tractor-four-seven-metres.toml")
     assert can_follow(problem)
     found, proven = Follower(problem).at(problem.limits), solve(problem).objective

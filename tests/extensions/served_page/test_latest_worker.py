@@ -49,7 +49,7 @@ def test_the_newest_wins(tmp_path: Path) -> None:
         assert third.result(LONG) == 3
 
 
-def test_what_is_at_work_too_long_makes_way(desk: LatestWorker, tmp_path: Path) -> None:
+def test_a_slow_request_is_superseded(desk: LatestWorker, tmp_path: Path) -> None:
     with ThreadPoolExecutor(2) as askers, at_work(desk, askers, tmp_path) as first:
         assert askers.submit(desk.ask, LONG, abs, -4).result(LONG) == 4
         assert isinstance(first.exception(LONG), Superseded)

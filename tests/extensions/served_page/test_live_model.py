@@ -80,7 +80,7 @@ def test_a_saved_file_is_evaluated_alike(every):
 @pytest.mark.parametrize(
     ("name", "still"), [("inline-five-torsion", "throws"), ("tractor-four-elastic", "front left.stiffness.x")]
 )
-def test_what_does_not_move_is_named_with_a_way_to_move_it(name, still):
+def test_numbers_without_a_slider_are_named_with_a_remedy(name, still):
     model = model_of(load(PROBLEMS / f"{name}.toml"))
     assert still in {name for name, _ in model.without_slider}
     assert all("laufruhe page" in why for _, why in model.without_slider)
@@ -139,7 +139,7 @@ def test_script_and_style_ask_for_nothing():
             assert word not in text.replace("http://www.w3.org/2000/svg", "")
 
 
-def test_what_a_star_is_decided_to_be_is_saved_from_its_result_alone():
+def test_a_decided_star_is_saved_from_its_result():
     result = ready.solved("vee-eight-open")
     model = live_model(result.problem, result)
     text, values = model.save.text, {entry.name: entry.value for entry in result.decisions}

@@ -178,7 +178,7 @@ def test_the_state_is_in_the_address_and_the_token_is_not(shown: Page, address: 
     assert "rod_ratio" not in shown.url
 
 
-def test_who_comes_without_the_token_is_told_so(page: Page, address: str) -> None:
+def test_a_visitor_without_the_token_gets_a_message(page: Page, address: str) -> None:
     # a tab keeps what it was told
     other = page.context.new_page()
     other.goto(address.partition("#")[0])
@@ -406,7 +406,7 @@ def test_a_comma_is_a_decimal_sign(shown: Page, typed: str, taken: str) -> None:
     [("1,500", '"1,500" can be read as 1500 or as 1.500'), ("2..5", '"2..5" is no number'), ("2 kg", "is no number"),
      ("", "is no number"), ("1,5,0", "is no number")],
 )  # fmt: skip
-def test_what_can_be_read_in_two_ways_or_in_none_is_refused_by_a_line(shown: Page, typed: str, said: str) -> None:
+def test_ambiguous_and_unreadable_numbers_are_refused(shown: Page, typed: str, said: str) -> None:
     value = settled(shown)
     figure = shown.locator(f'[data-number-of="{MASS}"]')
     figure.click()

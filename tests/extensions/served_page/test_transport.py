@@ -51,7 +51,7 @@ def request(
         return answer, answer.read()
 
 
-def test_who_has_the_token_is_answered(server: Server) -> None:
+def test_a_request_with_the_token_is_answered(server: Server) -> None:
     answer, body = request(server)
     assert answer.status == 200
     assert json.loads(body) == {"told": SECRET, "asked": {}}
@@ -90,7 +90,7 @@ def test_others_are_refused(server: Server, changes: dict[str, str | None], stat
 
 
 @pytest.mark.parametrize("body", [b"", b"{", b"NaN", b'{"a": Infinity}', b"\xff", b"[" * 60_000, b"null"])
-def test_what_is_no_json_is_refused(server: Server, body: bytes) -> None:
+def test_a_body_that_is_no_json_is_refused(server: Server, body: bytes) -> None:
     answer, content = request(server, body=body)
     assert answer.status == 400
     assert "error" in json.loads(content)

@@ -244,7 +244,7 @@ def test_masses_that_pass_zero_bound_nothing() -> None:
 
 
 @pytest.mark.slow
-def test_where_masses_weigh_nothing_it_is_a_geometric_program() -> None:
+def test_sizes_without_added_mass_agree_with_a_geometric_program() -> None:
     """A log-log convex program of cvxpy for the same sizes, loads taken once from the exact model."""
     result = laufruhe.solve(GP)
     assert result.certificate.kind is Proof.GLOBAL
@@ -295,7 +295,7 @@ def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
          "leaves a rod too short for the crank to turn"),
     ],
 )  # fmt: skip
-def test_what_is_not_decided_is_refused_in_a_line(text: str, rule: str, tmp_path: Path) -> None:
+def test_unsupported_sizes_are_refused_in_a_line(text: str, rule: str, tmp_path: Path) -> None:
     with pytest.raises((InputError, ModelError), match=rule) as refused:
         laufruhe.solve(loaded(tmp_path, text))
     assert "\n" not in str(refused.value)

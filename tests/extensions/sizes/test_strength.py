@@ -279,7 +279,7 @@ def test_sizes_that_are_none_are_one_line_each(old: str, new: str, rule: str, tm
         (lambda e: replace(e, bearings=e.bearings[::2]), "no main bearing between them"),
     ],
 )  # fmt: skip
-def test_what_is_missing_is_named(change: object, rule: str, engine: Engine) -> None:
+def test_a_missing_dimension_is_named(change: object, rule: str, engine: Engine) -> None:
     one = change(engine)  # type: ignore[operator]
     channel, _ = MEASURES["maximum web stress"]
     loads = PointLoads(POINT, crank_torque(engine, POINT), None, moving_parts=one)

@@ -184,7 +184,7 @@ def test_fewest_firings_give_the_torque(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_study_is_told_and_drawn(tmp_path: Path) -> None:
+def test_the_study_has_tables_and_pictures(tmp_path: Path) -> None:
     keys = 'opportunities = [4, 5]\ndemands = ["1/1", "30 N m", "25 N m"]'
     data = computed(tmp_path, study(MISFIRE, keys))
     kind = KINDS["skip fire"]

@@ -118,7 +118,7 @@ def test_limits_of_the_problem_are_drawn_at_its_points(tmp_path: Path) -> None:
     assert set(data["limit"].values[:, 1]) == {2000.0}
 
 
-def test_what_no_design_keeps_is_said_and_not_drawn(tmp_path: Path) -> None:
+def test_speeds_without_a_design_are_listed_and_not_drawn(tmp_path: Path) -> None:
     text = (PROBLEMS / "tractor-three.toml").read_text(encoding="utf-8")
     limit = '\n[[constraints]]\nlimit = "maximum mount force"\nmax = "1 N"\n'
     (tmp_path / "quiet.toml").write_text(text + limit, encoding="utf-8")

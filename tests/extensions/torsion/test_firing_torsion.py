@@ -149,7 +149,7 @@ def test_firing_orders_with_counterweights_open() -> None:
     assert result.limits[0].value <= 600.0 * (1.0 + 1e-6)
 
 
-def test_orders_of_one_star_are_told_apart() -> None:
+def test_firing_orders_of_one_star_differ() -> None:
     """Six cylinders: pairs of cylinders share a step, and which of the two fires first is another order."""
     six = tables(phasing={"best": 3}, objective={"minimise": "rms shaft twist"})
     six["engine"] = {**six["engine"], "cylinders": 6}
@@ -255,7 +255,7 @@ def test_banks_that_share_throws_are_decided_order_by_order() -> None:
     assert "72 of 72 firing orders of 9 stars" in result.certificate.method
 
 
-def test_heat_of_an_absorber_tells_firing_orders_apart() -> None:
+def test_heat_of_an_absorber_depends_on_the_firing_order() -> None:
     """Each order by itself is the judge; a limit that none keeps is proven to be one."""
     damper = {"name": "damper", "on": "pulley", "inertia": "0.01 kg m^2", "damping": "2 N m s/rad"}
     torsion = tables()["torsion"] | {"absorbers": [damper]}

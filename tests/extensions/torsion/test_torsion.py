@@ -199,7 +199,7 @@ def test_stress_is_torque_over_the_section_modulus(five: tuple[Engine, Operating
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_put_in_is_turned_to_heat(seed: int) -> None:
+def test_work_of_the_torques_becomes_heat(seed: int) -> None:
     """Work of every order on the discs is lost in shafts, at the cylinders and in the absorbers."""
     own, speed = random_chain(seed), 200.0
     cylinder = SliderCrank("one", 0.0, 0.045, 0.16, 0.6)

@@ -81,7 +81,7 @@ def test_bad_input_is_one_line(torsion: dict[str, Any], said: str | None) -> Non
     assert said in str(caught.value)
 
 
-def test_what_a_quantity_needs() -> None:
+def test_quantities_of_torsion_name_missing_keys() -> None:
     tables = tables_of(READY)
     for objective, crank, said in (
         ({"minimise": "maximum shaft stress", "sections": ["throw 1"]}, None, "is no shaft section here"),

@@ -120,14 +120,14 @@ def test_heat_is_a_limit(damper: tuple[Problem, Result]) -> None:
 
 
 @pytest.mark.slow
-def test_what_no_design_keeps() -> None:
+def test_a_stress_limit_that_no_design_keeps_is_named() -> None:
     low = [{"limit": "rms shaft stress", "max": "2 N/mm^2", "name": "low"}]
     result = laufruhe.solve(problem_of(constraints=low, search={"starts": 1}))
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("low",)
 
 
-def test_what_is_refused() -> None:
+def test_unsupported_open_numbers_of_torsion_are_refused() -> None:
     wide, open_ring = {"between": ["40 mm", "60 mm"]}, {"between": ["0 N m s/rad", "9 N m s/rad"]}
     pieces = [{"length": "30 mm", "diameter": wide}, {"length": "20 mm", "diameter": "50 mm"}]
     with pytest.raises(InputError, match="is open, but its shaft has several pieces"):
