@@ -157,6 +157,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")
     | dict.fromkeys(_OF_PISTONS, "piston_motion")
+    | dict.fromkeys(("shaft distance", "shaft clearance", "envelope radius"), "open_positions")
     | {"parts price": "parts_lists", "electric torque": "electric_torque"},
 }
 """Extensions of this package by the names that they add to tables, for the complaint if one is not installed."""

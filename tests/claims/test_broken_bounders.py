@@ -13,6 +13,7 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import BoundError
+from laufruhe.extensions.open_positions.solver import PlaceSearch
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.witness import STRICT, check_bound, collected
@@ -22,7 +23,6 @@ from laufruhe.prove.boxes.monotone import MonotoneProblem
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.prove.throws.star_cuts import Cut
-from laufruhe.solvers.boxes import places
 from laufruhe.solvers.conclusion import evaluate_design, witness_of
 from laufruhe.solvers.mounts.convex import ConvexProgram
 from laufruhe.solvers.mounts.nonlinear import mount_numbers
@@ -75,7 +75,7 @@ BROKEN = {
     "windows of throws": ("inline-nine-uneven", scaled(uneven_throws, "uneven_bound", lambda found: found + 1e3)),
     "throws": ("steam-two-crank", scaled(ThrowPrograms, "_bound", first_times(1.02))),
     "the flywheel": ("scotch-yoke-steam-pump", scaled(MonotoneProblem, "minimum_over", times(1.02))),
-    "places": ("tractor-four-shaft-heights", scaled(places.PlaceSearch, "box", bound_times(1.01))),
+    "places": ("tractor-four-shaft-heights", scaled(PlaceSearch, "box", bound_times(1.01))),
     "matrix inequalities": ("powertrain-torque-roll", scaled(ConvexProgram, "bound", first_times(1.001))),
 }
 """A ready problem of a family, and what breaks its bounder."""

@@ -18,7 +18,6 @@ from laufruhe.files.complaints import Refused, errors_at_key, nearest, require_o
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Engine, OperatingPoint
-from laufruhe.machine.clearances import shafts_of
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import (
@@ -180,11 +179,8 @@ class MeasureContext:
         names = getattr(table, "of", None)
         if measure.is_mass:
             self._check_masses(measure, names, key)
-        if channel.is_placing:
-            shafts = shafts_of(self.engine)
-            _check_known(names, shafts, f"{key}.of", "shaft")
-            if not shafts:
-                raise Refused(key, name, "needs balancer shafts, and this engine has none", "add one, or leave it out")
+        elif "of" in channel.keys:
+            _check_known(names, channel.places(self.engine), f"{key}.of", channel.place)
         return measure
 
     def _check_keys(self, channel: Channel, table: QuantityTable, where: str) -> None:

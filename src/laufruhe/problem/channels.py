@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from laufruhe.extension import extended
 from laufruhe.machine import Block, Engine, Flywheel, OperatingPoint, Role
 from laufruhe.machine.block import LoadCase
-from laufruhe.machine.clearances import Span, distances, reaches
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import bearing_loads as bearings
@@ -142,11 +141,6 @@ class Channel:
     title, place
         Title and place column of the table in every report for a load at even speed; empty if it is shown on request
         only.
-    span
-        For distances of shafts: function of measure and two engines that returns (smallest, largest) values while the
-        shafts move between their places in the two engines.
-    is_placing
-        True for distances of shafts.
     linear_in
         Load of which it is a linear function at each crank angle, so that it depends on decisions as that load does.
     """
@@ -168,8 +162,6 @@ class Channel:
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
     title: str = ""
     place: str = ""
-    span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]] = lambda *_: ()
-    is_placing: bool = False
     linear_in: Channel | None = None
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
@@ -516,19 +508,6 @@ def _stored_work(moving_parts: Engine, point: OperatingPoint, fidelity: Fidelity
     return excess_torque(moving_parts, point, fidelity).integral.mapped(lambda values: values[:, None, None])
 
 
-def _of_places(
-    name: str, sides: tuple[str, ...], span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]]
-) -> Channel:
-    # distance between places of balancer shafts
-    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
-        return [lower for lower, _ in span(measure, evaluation.engine, evaluation.engine)]
-
-    return NumberChannel(
-        name, "m", ("of",), sides=sides, minimised=False, depends_on_loads=False, values=values, span=span,
-        is_placing=True,
-    )  # fmt: skip
-
-
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
 RESULTANT_MOUNT_FORCE = LoadChannel(
     "resultant mount force", "N", OF_VECTOR, Needs.MOUNTS, is_block_load=True,
@@ -568,11 +547,6 @@ COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTER
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
 ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BALANCER))
 
-SHAFT_DISTANCE = _of_places("shaft distance", ("min", "max"), lambda m, a, b: distances(m.rotors, a, b, False))
-SHAFT_CLEARANCE = _of_places("shaft clearance", ("min",), lambda m, a, b: distances(m.rotors, a, b, True))
-ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reaches(m.rotors, a, b))
-OF_SHAFT_PLACES = frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS})
-
 
 def is_at_mounts(channel: Channel) -> bool:
     """Return True for the channels of mount force and mount travel."""
@@ -583,5 +557,5 @@ CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, RESULTANT_MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
     SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
-    ADDED_MASS, *OF_MOUNTING, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS,
+    ADDED_MASS, *OF_MOUNTING,
 ))  # fmt: skip

@@ -70,9 +70,6 @@ stored work                         0 0 a  0 m >  >  0 0  0
 counterweight mass                  a 0 a  0 0 0  a  0 0  0
 balancer mass                       a 0 a  0 0 0  a  0 0  0
 added mass                          a 0 a  0 0 0  a  0 0  0
-shaft distance                      0 0 0  s 0 0  0  0 0  0
-shaft clearance                     0 0 0  s 0 0  0  0 0  0
-envelope radius                     0 0 0  c 0 0  0  0 0  0
 static sag                          0 0 0  0 0 0  0  c s  0
 natural frequencies                 0 0 0  0 0 0  0  + s  0
 motion frequencies                  0 0 0  0 0 0  0  ? ?  0

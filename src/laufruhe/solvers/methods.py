@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -17,9 +16,7 @@ from laufruhe.numerics.progress import Listener, progress_listener, report_progr
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
     FREQUENCIES,
-    IRREGULARITY,
     OF_FLYWHEEL,
-    OF_SHAFT_PLACES,
 )
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends, open_kinds
@@ -31,7 +28,6 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.solvers.attainable_limits import with_attainable_limits
-from laufruhe.solvers.boxes.place_boxes import without_places
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     ProofData,
@@ -46,7 +42,7 @@ from laufruhe.solvers.conclusion import (
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
 from laufruhe.solvers.decomposition import is_separable, refuse_unused, solve_decomposed
-from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, imported, is_pointwise
+from laufruhe.solvers.method import BUILT, OF_MOUNTS, Method, imported, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
@@ -55,40 +51,13 @@ from laufruhe.solvers.stars.even_search import refuse_long
 from laufruhe.solvers.walk import check_by_walk
 
 
-def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evaluation) -> tuple[Problem, Evaluation]:
-    """Return the problem without those optional shafts, alone or in pairs, that violate limits on their positions.
-
-    Parameters
-    ----------
-    limits
-        Limits that depend on the choice of shafts alone.
-    initial
-        Evaluation with all shafts.
-
-    Returns
-    -------
-    The problem without these sets of shafts, and the evaluation without any optional shaft. Every design violates the
-    limits that this evaluation violates.
-    """
-    placing = tuple(limit for limit in limits if limit.measure.channel.is_placing)
-    phasing = problem.phasing
-    if phasing is None or not (phasing.shafts.optional and placing):
-        return problem, initial
-
-    def evaluation_with(sets: Sequence[int]) -> Evaluation:
-        left_out = phasing.without(sets)
-        rotors = tuple(rotor for rotor in initial.engine.rotors if rotor.shaft.name not in left_out)
-        return replace(initial, engine=replace(initial.engine, rotors=rotors))
-
-    clashes: list[tuple[int, ...]] = []
-    # a distance involves one shaft or two
-    for count in (1, 2):
-        for sets in itertools.combinations(range(len(phasing.shafts.optional)), count):
-            is_known = any(set(clash) <= set(sets) for clash in clashes)
-            if not is_known and violated_limits(placing, evaluation_with(sets)):
-                clashes.append(sets)
-    shafts = replace(phasing.shafts, clashes=tuple(clashes))
-    return replace(problem, phasing=replace(phasing, shafts=shafts)), evaluation_with(())
+def with_shafts(problem: Problem, initial: Evaluation, sets: Sequence[int]) -> Evaluation:
+    """Return an evaluation with only these optional shafts, as indices of their sets; its loads stay."""
+    if problem.phasing is None:
+        return initial
+    left_out = problem.phasing.without(sets)
+    rotors = tuple(rotor for rotor in initial.engine.rotors if rotor.shaft.name not in left_out)
+    return replace(initial, engine=replace(initial.engine, rotors=rotors))
 
 
 TIME_LIMIT_NOTE = "stopped at the time limit"
@@ -102,15 +71,6 @@ _SOLVE_JOINT = imported(f"{_HERE}.mounts.nonlinear:solve_joint")
 def solve_separable(problem: Problem) -> Result:
     """Solve groups of decisions that do not affect each other, each by its own method."""
     return solve_decomposed(problem, _solve_reduced)
-
-
-def solve_with_places(problem: Problem) -> Result:
-    """Return the best positions of shafts, with a bound by the method that decides all other numbers."""
-    from laufruhe.solvers.boxes.places import solve_places_with
-
-    method = _method(without_places(problem))
-    # `Method.solve` refines the fidelity, so the inner solver does not
-    return solve_places_with(problem, method.solver, method.name, solve_all_numbers)
 
 
 def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
@@ -127,8 +87,7 @@ def _distinguishes_stars(problem: Problem) -> bool:
     return problem.engine.block is not None and not (moves and any(numbers))
 
 
-_AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
-_PLACED = (Dependence.BIAFFINE, Dependence.KINKED)
+_AFFINE = (Dependence.AFFINE,)
 _ANY = tuple(Dependence)
 _UNBALANCES = {Kind.UNBALANCE: _AFFINE}
 _MOUNTS = {**_UNBALANCES, Kind.STIFFNESS: (), Kind.MOUNT: ()}
@@ -156,14 +115,6 @@ _CORE: tuple[Method, ...] = (
         "second-order cones of pistons", {**_UNBALANCES, Kind.PISTON: _AFFINE}, ProofStrength.EXACT, _SOLVE_CONES,
         refines_fidelity=True,
         proves="the optimum",
-    ),
-    Method(
-        "cones over boxes of places", {**_UNBALANCES, Kind.PLACE: _PLACED}, ProofStrength.EXACT,
-        imported(f"{_HERE}.boxes.places:solve_places"),
-        refines_fidelity=True,
-        known_channels=OF_SHAFT_PLACES,
-        accepts_norm=is_pointwise,
-        proves="the optimum, as far as the boxes go (P8)",
     ),
     Method(
         "stars, each with cones", {Kind.STAR: BUILT, **_UNBALANCES}, ProofStrength.EXACT, _SOLVE_STARS,
@@ -204,16 +155,6 @@ _CORE: tuple[Method, ...] = (
         accepts_norm=is_pointwise,
         accepts_problem=_distinguishes_stars,
         proves="a local optimum, with a bound",
-    ),
-    Method(
-        "local programs, places at their corners",
-        {**_UNBALANCES, Kind.PLACE: _PLACED, Kind.PISTON: _AFFINE, Kind.SIZE: _MASSES, Kind.LEAD: _SHIFT},
-        ProofStrength.EXACT, solve_with_places,
-        refines_fidelity=True,
-        known_channels=OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
-        accepts_problem=lambda problem: Kind.PLACE in open_kinds(problem)
-        and _method(without_places(problem)).strength is ProofStrength.EXACT,
-        proves="what is proven of the rest with places at the corners of their bounds (P20)",
     ),
     Method(
         "local programs of all numbers", dict.fromkeys(KINDS.values(), _ANY), ProofStrength.RELAXED, solve_all_numbers,
@@ -300,8 +241,8 @@ def _at_time_limit(problem: Problem, result: Result | None) -> Result:
     return replace(result, certificate=replace(certificate, method=f"{certificate.method}; {TIME_LIMIT_NOTE}"))
 
 
-def _method(problem: Problem) -> Method:
-    # the last method suits every problem
+def method_of(problem: Problem) -> Method:
+    """Return the first method that suits a problem; the last suits every one."""
     return next(method for method in METHODS if method.suits(problem))
 
 
@@ -333,9 +274,9 @@ def _refuse(problem: Problem, ranks: Sequence[PriorityLevel]) -> None:
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")
-    if problem.phasing is not None and _method(problem).solver is _SOLVE_STARS:
+    if problem.phasing is not None and method_of(problem).solver is _SOLVE_STARS:
         refuse_long(problem)
-    if _method(problem).solver is solve_separable and not _has_constant_objective(problem):
+    if method_of(problem).solver is solve_separable and not _has_constant_objective(problem):
         refuse_unused(problem, ranks)
 
 
@@ -348,7 +289,7 @@ def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = Non
     for k, reduction in enumerate(remaining):
         if reduction.applies(problem):
             return reduction.solve(problem, _solve_reduced, partial(_solve_reduced, remaining=remaining[k + 1 :]))
-    method, kinds = _method(problem), open_kinds(problem)
+    method, kinds = method_of(problem), open_kinds(problem)
     report_progress(method.name)
     if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS} and (conflict := conflict_on_any_mounts(problem)):
         return infeasible_result(problem, evaluate_start(problem), conflict, {})
@@ -383,7 +324,7 @@ def by_solver(problem: Problem, name: str) -> Problem:
     """
     from laufruhe.solvers.cones.cvxpy_program import check_solver
 
-    name, method = check_solver(name), _method(problem)
+    name, method = check_solver(name), method_of(problem)
     if problem.extras or method.solver is not _SOLVE_CONES:
         what = " and ".join(extra.words for extra in problem.extras) or f"'{method.name}'"
         rule = f"decides unbalances alone, and this problem is decided by {what}"
@@ -399,7 +340,7 @@ def _refuse_ranks(problem: Problem) -> None:
 def _solve_ranks(problem: Problem, decide: Decide, _: Decide) -> Result:
     from laufruhe.solvers.lexicographic import solve_lexicographic
 
-    is_divided = _method(problem).solver is solve_separable
+    is_divided = method_of(problem).solver is solve_separable
     solve_rank = partial(solve_decomposed, solve=decide, ranks=problem.ranks) if is_divided else decide
     return solve_lexicographic(problem, solve_rank)
 
@@ -414,8 +355,8 @@ def _without_constant_limits(problem: Problem, decide: Decide, _: Decide) -> Res
     initial = evaluate_start(problem)
     # raise ModelError first if the initial design cannot be evaluated
     objective_value(problem, initial)
-    problem, least_shafts = exclude_collisions(problem, constant, initial)
-    violated = violated_limits(constant, with_fine_sampling(least_shafts))
+    # every design violates the limits that the engine without optional shafts violates
+    violated = violated_limits(constant, with_fine_sampling(with_shafts(problem, initial, ())))
     if violated:
         return infeasible_result(problem, initial, violated, {})
     open_limits = tuple(limit for limit in problem.limits if limit not in constant)

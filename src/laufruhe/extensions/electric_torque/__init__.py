@@ -8,10 +8,10 @@ _SMOOTH = ("transmissibility", "degree of irregularity")
 _FREE = (
     "shaking force", "rocking couple", "surging force", "swaying couple", "main-bearing force", "main-bearing pressure",
     "hammer blow", "friction power", "crank-pin force", "crank-pin pressure", "side force", "rod force", "crank torque",
-    "counterweight mass", "balancer mass", "added mass", "shaft distance", "shaft clearance", "envelope radius",
-    "static sag", "natural frequencies", "motion frequencies", "kinetic-energy decoupling", "decoupling shortfall",
-    "torque-roll residual", "raw torque-roll residual", "total stiffness", "static travel", "static mount force",
-    "flywheel inertia", "flywheel mass", "rim stress", "arm stress",
+    "counterweight mass", "balancer mass", "added mass", "static sag", "natural frequencies", "motion frequencies",
+    "kinetic-energy decoupling", "decoupling shortfall", "torque-roll residual", "raw torque-roll residual",
+    "total stiffness", "static travel", "static mount force", "flywheel inertia", "flywheel mass", "rim stress",
+    "arm stress",
 )  # fmt: skip
 EXTENSION = Extension(
     "electric_torque",

@@ -15,6 +15,6 @@ CONES = Method(
     ProofStrength.EXACT,
     imported("laufruhe.solvers.cones.unbalances:solve_unbalances"),
     refines_fidelity=True,
-    before="cones over boxes of places",
+    before="stars, each with cones",
     proves="the optimum",
 )

@@ -8,7 +8,7 @@ from laufruhe.problem.dependence import Dependence
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.method import Method, imported, is_no_number, is_pointwise
 
-_SOLVER, _NEXT = "laufruhe.extensions.phase_leads.solver", "cones over boxes of places"
+_SOLVER, _NEXT = "laufruhe.extensions.phase_leads.solver", "stars, each with cones"
 
 SHIFTED_LOADS = Method(
     "boxes of leads", {Kind.UNBALANCE: (Dependence.AFFINE,), Kind.LEAD: (Dependence.SHIFT,)}, ProofStrength.EXACT,

@@ -3,32 +3,35 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from typing import TypeAlias
 
 import numpy as np
 
+from laufruhe.extensions.open_positions.channels import ShaftChannel
+from laufruhe.extensions.open_positions.relaxation import Relaxation, without_places
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import real_bounds
+from laufruhe.problem.decision import Kind, real_bounds
+from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, halves
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.witness import thin_box
-from laufruhe.solvers.boxes.place_boxes import Relaxation
 from laufruhe.solvers.boxes.search import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.conclusion import Design, evaluate_design, infeasible_result, values_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.methods import method_of, solve_all_numbers
 from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
 from laufruhe.solvers.relaxation import with_better_bound
 from laufruhe.solvers.result import Result, Status
 
 Solve: TypeAlias = Callable[[Problem], Result]
-Propose: TypeAlias = Callable[[Problem, Sequence[Sequence[Value]]], Result]
 MAX_BOXES, MAX_OTHERS = 300, 500
 """Largest number of boxes of positions, and of boxes of the method for the other decisions."""
 OTHER_SHARE = 0.5
@@ -70,35 +73,35 @@ def solve_places(problem: Problem) -> Result:
     return search.solve(root, first, problem.search.boxes_or(MAX_BOXES), "places", "second-order cones over")
 
 
-def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Propose) -> Result:
-    """Return the best design of a local search over positions and other decisions, with a lower bound (P20).
+def is_exact_at_corners(problem: Problem) -> bool:
+    """Return True if a method proves the optimum of all other numbers, with places at the corners of their bounds."""
+    return Kind.PLACE in open_kinds(problem) and method_of(without_places(problem)).strength is ProofStrength.EXACT
 
-    The bound is that of the relaxation over all positions.
 
-    Parameters
-    ----------
-    prove, method
-        Solver for the problem without open positions, and its name.
-    propose
-        Local search from start values of all decisions.
+def solve_at_corners(problem: Problem) -> Result:
+    """Return the best design of local searches over positions and other decisions, with a lower bound (P20).
+
+    The bound is that of the relaxation over all positions, by the method that decides all other numbers.
     """
-    started, maximum = time.perf_counter(), problem.search.boxes_or(MAX_OTHERS)
+    started, method = time.perf_counter(), method_of(without_places(problem))
+    maximum = problem.search.boxes_or(MAX_OTHERS)
 
     def prove_roughly(relaxed: Problem) -> Result:
         search = replace(relaxed.search, boxes=maximum)
-        return prove(replace(relaxed, tolerance=OTHER_SHARE * problem.tolerance, search=search))
+        # `Method.solve` refines the fidelity, so this solver does not
+        return method.solver(replace(relaxed, tolerance=OTHER_SHARE * problem.tolerance, search=search))
 
     search = _PlaceSearchByMethod(problem, prove_roughly)
     root = search.box(*search.bounds)
     if isinstance(root, FathomedPart):
         return infeasible_result(problem, evaluate(problem), search.conflict, {"solve": time.perf_counter() - started})
-    result = propose(problem, [root.start])
+    result = solve_all_numbers(problem, [root.start])
     if not result.status.has_design or not problem.search.proves:
         return result
     first = RebalancedDesign(evaluate_design(problem, values_of(problem, result), result.final.samples), result)
     search.what = "boxes of places"
     _, bound, _ = search.search(root, first, numerical_zero(problem), problem.tolerance, 1)
-    return with_better_bound(result, bound, f"{method} with places at the corners of their bounds")
+    return with_better_bound(result, bound, f"{method.name} with places at the corners of their bounds")
 
 
 class PlaceSearch(RebalancedSearch[_Box]):
@@ -107,7 +110,11 @@ class PlaceSearch(RebalancedSearch[_Box]):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.relaxation = Relaxation(problem, SHARE)
-        self._envelope = [limit for limit in problem.limits if limit.measure.channel.is_placing]
+        self._envelope = [
+            (limit, limit.measure.channel)
+            for limit in problem.limits
+            if isinstance(limit.measure.channel, ShaftChannel)
+        ]
         self.places = self.relaxation.places
 
     @property
@@ -169,8 +176,8 @@ class PlaceSearch(RebalancedSearch[_Box]):
             return
         low = self.problem.design(lower.tolist(), self.places)
         high = low if np.array_equal(lower, upper) else self.problem.design(upper.tolist(), self.places)
-        for limit in self._envelope:
-            for minimum, maximum in limit.measure.channel.span(limit.measure, low, high):
+        for limit, channel in self._envelope:
+            for minimum, maximum in channel.span(limit.measure, low, high):
                 yield limit, minimum, maximum
 
     def _move_into_limits(self, middle: Array, lower: Array, upper: Array) -> Array | None:
@@ -208,7 +215,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         # a limit has one distance per shaft
         active = [
             (limit, k, side)
-            for limit in self._envelope for k, value in enumerate(design.evaluation.values(limit.measure))
+            for limit, _ in self._envelope for k, value in enumerate(design.evaluation.values(limit.measure))
             for slack, _, side in (limit.slack(value),) if slack <= ACTIVE
         ]  # fmt: skip
         if not active:

@@ -23,6 +23,7 @@ from itertools import pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.extensions.open_positions.channels import ShaftChannel
 from laufruhe.machine import Role, Rotor
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import ADDED_MASS
@@ -46,7 +47,7 @@ class Relaxation:
     def __init__(self, problem: Problem, share: float) -> None:
         self._tolerance = share * problem.tolerance
         # the relaxation ignores limits on distances
-        limits = tuple(limit for limit in problem.limits if not limit.measure.channel.is_placing)
+        limits = tuple(limit for limit in problem.limits if not isinstance(limit.measure.channel, ShaftChannel))
         self.problem = problem = problem.changed(limits=limits)
         self.places = tuple(d for d in problem.decisions if d.kind is Kind.PLACE)
         self.other_decisions = tuple(d for d in problem.decisions if d.kind is not Kind.PLACE)

@@ -14,11 +14,11 @@ from scipy.optimize import minimize
 import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.extensions.fidelity.trade import trade
+from laufruhe.extensions.open_positions.solver import PlaceSearch, _Box
 from laufruhe.machine import Engine
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.boxes.places import PlaceSearch, _Box
 from laufruhe.solvers.conclusion import evaluate_design
 from problem_files import READY
 
@@ -360,9 +360,9 @@ def test_distances_that_no_place_keeps(tmp_path: Path) -> None:
 
 
 def test_distances_of_what_is_not_there_are_refused(tmp_path: Path) -> None:
-    for limit, said in (
-        ('limit = "shaft distance"\nmin = "1 mm"', "needs balancer shafts"),
-        ('limit = "shaft distance"\nof = ["nothing"]\nmin = "1 mm"', "no shaft here"),
+    for shaft, limit, said in (
+        ("", 'limit = "shaft distance"\nmin = "1 mm"', "needs balancer shafts"),
+        (_shaft(), 'limit = "shaft distance"\nof = ["nothing"]\nmin = "1 mm"', "is no shaft here"),
     ):
         with pytest.raises(InputError, match=said):
-            _problem(tmp_path, _engine() + f"[[constraints]]\n{limit}\n")
+            _problem(tmp_path, f"{_engine()}{shaft}[[constraints]]\n{limit}\n")

@@ -1,16 +1,21 @@
-"""Distances between shafts, and radii that shafts sweep, also for shafts that move in boxes of positions."""
+"""Channels of distances between shafts, and of radii that shafts sweep, also for shafts that move in boxes.
+
+Only limits may contain them.
+"""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
-from laufruhe.machine.engine import Engine
-from laufruhe.machine.rotor import CRANKSHAFT, Role, Shaft
+from laufruhe.machine import CRANKSHAFT, Engine, Role, Shaft
+from laufruhe.problem.channels import Need, NumberChannel
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 Span = tuple[float, float]
+SpanFunction = Callable[[MeasureQuery, Engine, Engine], Sequence[Span]]
 
 
 @dataclass(frozen=True)
@@ -78,3 +83,35 @@ def _separation(lower: tuple[Shaft, Shaft], upper: tuple[Shaft, Shaft]) -> Span:
         minimum, maximum = min(first_pair) - max(second_pair), max(first_pair) - min(second_pair)
         spans.append((max(minimum, -maximum, 0.0), max(abs(minimum), abs(maximum))))
     return math.hypot(spans[0][0], spans[1][0]), math.hypot(spans[0][1], spans[1][1])
+
+
+_SHAFTS = Need(shafts_of, "balancer shafts, and this engine has none", "add one, or leave it out")
+
+
+@dataclass(frozen=True, eq=False)
+class ShaftChannel(NumberChannel):
+    """Distance of shafts.
+
+    Attributes
+    ----------
+    span
+        Function of measure and two engines that returns (smallest, largest) values while the shafts move between their
+        places in the two engines.
+    """
+
+    span: SpanFunction = field(kw_only=True)
+
+
+def _channel(name: str, sides: tuple[str, ...], span: SpanFunction) -> ShaftChannel:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
+        return [lower for lower, _ in span(measure, evaluation.engine, evaluation.engine)]
+
+    return ShaftChannel(
+        name, "m", ("of",), _SHAFTS, sides, minimised=False, depends_on_loads=False, values=values, span=span,
+        places=shafts_of, place="shaft",
+    )  # fmt: skip
+
+
+SHAFT_DISTANCE = _channel("shaft distance", ("min", "max"), lambda m, a, b: distances(m.rotors, a, b, False))
+SHAFT_CLEARANCE = _channel("shaft clearance", ("min",), lambda m, a, b: distances(m.rotors, a, b, True))
+ENVELOPE_RADIUS = _channel("envelope radius", ("max",), lambda m, a, b: reaches(m.rotors, a, b))

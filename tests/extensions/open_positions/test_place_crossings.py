@@ -14,10 +14,10 @@ from attack.families import toml
 from attack.openings import Openings
 from attack.plain_loads import number
 from lanes import first_fast
+from laufruhe.extensions.open_positions.relaxation import Relaxation, without_places
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.boxes.place_boxes import Relaxation, without_places
 from laufruhe.solvers.methods import METHODS
 
 READING = 2e-5
