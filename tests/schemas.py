@@ -75,8 +75,8 @@ def _short(name: str) -> str:
 def _words(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str) -> str:
     """Return the words of this key, else of its table, else of the key in any table."""
     words, of_table = _texts()["words"], _of_table(schema, entry)
-    own = "" if of_table == ANYWHERE else of_table
-    return str(words.get(path) or own or words.get(path.rpartition(".")[2], ""))
+    text = "" if of_table == ANYWHERE else of_table
+    return str(words.get(path) or text or words.get(path.rpartition(".")[2], ""))
 
 
 def kind(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:

@@ -79,7 +79,7 @@ def solved(table: Table, folder: Path, name: str = "problem") -> Any:
 
 
 @contextlib.contextmanager
-def silence_heard(wrong: list[str]):
+def collected_complaints(wrong: list[str]):
     """Count as a defect what is printed or warned of meanwhile."""
     messages = io.StringIO()
     with (
@@ -98,7 +98,7 @@ def tried(verdict: Verdict, work: Callable[[], list[str]]) -> Verdict:
     """Complaints of a piece of work that solves; an error is one."""
     started = time.perf_counter()
     try:
-        with silence_heard(verdict.wrong):
+        with collected_complaints(verdict.wrong):
             answer = work()
         verdict.wrong += [line for line in answer if not line.startswith("note: ")]
         verdict.notes += [line for line in answer if line.startswith("note: ")]
@@ -126,7 +126,7 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
     """
     verdict, started = Verdict(family, seed), time.perf_counter()
     try:
-        with silence_heard(verdict.wrong):
+        with collected_complaints(verdict.wrong):
             result = solved(table, folder, f"{family}-{seed}-{os.getpid()}")
     except Exception as error:
         verdict.status = "error"

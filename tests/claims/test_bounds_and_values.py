@@ -18,14 +18,14 @@ TRUE_MEAN = 46.10256
 
 def test_a_mean_is_read_at_the_angles_of_its_bound() -> None:
     """The bound of the whole cycle lies over the mean at 360 angles: the value is read at more, and is over it."""
-    found = laufruhe.solve(INPUTS / "places-case.toml")
-    assert found.objective is not None
-    assert found.certificate is not None
-    value, bound = found.objective.value, found.certificate.lower_bound
-    many = objective_value(found.problem, replace(found.final, samples=115_200))
+    result = laufruhe.solve(INPUTS / "places-case.toml")
+    assert result.objective is not None
+    assert result.certificate is not None
+    value, bound = result.objective.value, result.certificate.lower_bound
+    many = objective_value(result.problem, replace(result.final, samples=115_200))
     assert many == pytest.approx(TRUE_MEAN, abs=1e-5)
     assert bound < value
     assert value == pytest.approx(many, rel=1e-6)
     assert bound <= many
-    assert 0.0 < found.certificate.gap < 1e-5
-    assert found.certificate.kind is Proof.GLOBAL
+    assert 0.0 < result.certificate.gap < 1e-5
+    assert result.certificate.kind is Proof.GLOBAL

@@ -105,14 +105,14 @@ def test_a_broken_bounder_by_expansions(monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_proof_that_contradicts_a_design_is_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(STRICT)
     scaled(certificate, "lower_bound", value_times(1.001))(monkeypatch)
-    found = laufruhe.solve(PROBLEMS / "flat-four.toml")
-    assert found.status is Status.FEASIBLE
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert (found.certificate.kind, found.certificate.lower_bound) == (Proof.NONE, 0.0)
-    assert "its proof is withheld" in found.message
-    assert "please report it" in found.message
-    (bound, value) = map(float, re.findall(r"bound of (\S+) contradicts a known design of (\S+)", found.message)[0])
+    result = laufruhe.solve(PROBLEMS / "flat-four.toml")
+    assert result.status is Status.FEASIBLE
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert (result.certificate.kind, result.certificate.lower_bound) == (Proof.NONE, 0.0)
+    assert "its proof is withheld" in result.message
+    assert "please report it" in result.message
+    (bound, value) = map(float, re.findall(r"bound of (\S+) contradicts a known design of (\S+)", result.message)[0])
     assert bound > value > 0.0
 
 

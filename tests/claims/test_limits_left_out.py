@@ -31,39 +31,39 @@ def _minimum(problem: Problem, count: int = 400) -> float:
     (decision,) = problem.decisions
     values = []
     for value in np.linspace(decision.lower, decision.upper, count):
-        found = evaluate(problem, problem.design([float(value)]))
-        if found.violation(problem.limits) <= 0.0:
-            values.append(objective_value(problem, found))
+        evaluation = evaluate(problem, problem.design([float(value)]))
+        if evaluation.violation(problem.limits) <= 0.0:
+            values.append(objective_value(problem, evaluation))
     return min(values)
 
 
 @pytest.mark.slow
 def test_a_limit_with_room_takes_nothing_from_the_proof(problem: Problem) -> None:
-    found = laufruhe.solve(problem)
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert found.certificate.kind is Proof.GLOBAL
-    assert found.certificate.gap < 1e-4
-    assert found.objective.value == pytest.approx(38.3224, rel=1e-5)
-    assert found.certificate.lower_bound <= _minimum(problem) * (1.0 + 1e-9)
-    assert [limit.name for limit in found.limits] == [limit.name for limit in problem.limits]
+    result = laufruhe.solve(problem)
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.gap < 1e-4
+    assert result.objective.value == pytest.approx(38.3224, rel=1e-5)
+    assert result.certificate.lower_bound <= _minimum(problem) * (1.0 + 1e-9)
+    assert [limit.name for limit in result.limits] == [limit.name for limit in problem.limits]
 
 
 def test_the_optimum_without_a_limit_that_it_keeps_is_the_optimum() -> None:
     """A weight under a limit on transmissibility, of which cone programs know nothing: against random designs."""
-    own = laufruhe.load({"title": "ratio", **transmissibility_and_weights(np.random.default_rng(1))})
-    found, random = laufruhe.solve(own), np.random.default_rng(2)
-    assert found.certificate is not None
-    assert found.certificate.kind is Proof.GLOBAL
-    assert "dual bound" in found.certificate.method
-    assert found.final.violation(own.limits) <= 1e-6
-    (decision,) = own.decisions
+    problem = laufruhe.load({"title": "ratio", **transmissibility_and_weights(np.random.default_rng(1))})
+    result, random = laufruhe.solve(problem), np.random.default_rng(2)
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    assert "dual bound" in result.certificate.method
+    assert result.final.violation(problem.limits) <= 1e-6
+    (decision,) = problem.decisions
     for _ in range(20):
         design = evaluate(
-            own, own.design([decision.set.directions[0] * random.uniform(decision.lower, decision.upper)])
+            problem, problem.design([decision.set.directions[0] * random.uniform(decision.lower, decision.upper)])
         )
-        if design.violation(own.limits) <= 0.0:
-            assert found.certificate.lower_bound <= objective_value(own, design)
+        if design.violation(problem.limits) <= 0.0:
+            assert result.certificate.lower_bound <= objective_value(problem, design)
 
 
 @pytest.mark.slow
@@ -73,27 +73,27 @@ def test_stiffness_has_a_bound_under_a_limit_without_formulas(share: float, kind
     own = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
     free, measure = laufruhe.solve(own), Measure(CHANNELS["motion frequencies"])
     limit = Limit("roll", measure, maximum=share * max(free.final.values(measure)))
-    found = laufruhe.solve(own.changed(limits=(*own.limits, limit)))
+    result = laufruhe.solve(own.changed(limits=(*own.limits, limit)))
     assert free.certificate is not None
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert found.certificate.kind is kind
-    assert found.certificate.lower_bound == free.certificate.lower_bound
-    assert found.final.violation(found.problem.limits) <= FEASIBILITY_TOL
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert result.certificate.kind is kind
+    assert result.certificate.lower_bound == free.certificate.lower_bound
+    assert result.final.violation(result.problem.limits) <= FEASIBILITY_TOL
 
 
 @pytest.mark.slow
 @pytest.mark.skipif("worst mean" not in NORMS, reason="the extension worst_mean is removed")
 def test_boxes_bound_a_norm_that_no_method_of_mounts_accepts() -> None:
     """Worst means of forces on open stiffness, which local programs decide, against random designs."""
-    own = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
-    worst = own.changed(objective=(Term(Measure(CHANNELS["mount force"], NORMS["worst mean"])),), limits=())
-    found, random = laufruhe.solve(worst), np.random.default_rng(3)
-    assert found.certificate is not None
-    assert found.certificate.kind is Proof.GLOBAL
+    problem = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
+    worst = problem.changed(objective=(Term(Measure(CHANNELS["mount force"], NORMS["worst mean"])),), limits=())
+    result, random = laufruhe.solve(worst), np.random.default_rng(3)
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
     for _ in range(20):
         values = [random.uniform(decision.lower, decision.upper) for decision in worst.decisions]
-        assert found.certificate.lower_bound <= objective_value(worst, evaluate(worst, worst.design(values)))
+        assert result.certificate.lower_bound <= objective_value(worst, evaluate(worst, worst.design(values)))
 
 
 @pytest.mark.slow
@@ -106,34 +106,34 @@ def test_a_limit_that_holds_leaves_at_least_the_bound_without_it(problem: Proble
         for value in np.linspace(problem.decisions[0].lower, problem.decisions[0].upper, 200)
     )
     tight = problem.changed(limits=(replace(limit, maximum=0.5 * (reached + low)),))
-    found = laufruhe.solve(tight)
+    result = laufruhe.solve(tight)
     assert low < reached
-    assert found.certificate is not None
-    assert found.objective is not None
+    assert result.certificate is not None
+    assert result.objective is not None
     assert free.objective is not None
     # boxes of the weight may show more than that
-    assert free.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _minimum(tight)
-    assert found.final.violation(tight.limits) <= 1e-5
+    assert free.objective.value * (1.0 - 1e-4) <= result.certificate.lower_bound <= _minimum(tight)
+    assert result.final.violation(tight.limits) <= 1e-5
 
 
 @pytest.mark.slow
 def test_a_term_that_no_closing_method_knows_takes_its_own_share_alone(problem: Problem) -> None:
     (limit,), (term,) = problem.limits, problem.objective
     both = problem.changed(objective=(term, Term(Measure(limit.measure.channel, orders=(1.0,)), 3.0)), limits=())
-    found, alone = laufruhe.solve(both), laufruhe.solve(problem.changed(limits=()))
-    assert found.certificate is not None
+    result, alone = laufruhe.solve(both), laufruhe.solve(problem.changed(limits=()))
+    assert result.certificate is not None
     assert alone.objective is not None
-    assert found.objective is not None
-    assert alone.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _minimum(both)
-    assert found.objective.value <= _minimum(both) * (1.0 + 1e-6)
+    assert result.objective is not None
+    assert alone.objective.value * (1.0 - 1e-4) <= result.certificate.lower_bound <= _minimum(both)
+    assert result.objective.value <= _minimum(both) * (1.0 + 1e-6)
 
 
 @pytest.mark.slow
 def test_a_useless_bound_is_reported_as_none(problem: Problem) -> None:
-    found = laufruhe.solve(problem)
-    assert found.certificate is not None
-    empty = replace(found, certificate=replace(found.certificate, kind=Proof.WITHIN_GAP, lower_bound=0.0, gap=1.0))
-    local = replace(found, certificate=replace(found.certificate, kind=Proof.LOCAL, lower_bound=0.0, gap=1.0))
+    result = laufruhe.solve(problem)
+    assert result.certificate is not None
+    empty = replace(result, certificate=replace(result.certificate, kind=Proof.WITHIN_GAP, lower_bound=0.0, gap=1.0))
+    local = replace(result, certificate=replace(result.certificate, kind=Proof.LOCAL, lower_bound=0.0, gap=1.0))
     for each in (empty, local):
         text = f"{headline(each)} {explained(each)}"
         assert "no useful lower bound was found" in headline(each)

@@ -35,9 +35,9 @@ def frequencies(table: dict[str, Any], stiffness: float) -> np.ndarray:
 def test_a_band_that_no_stiffness_leaves_is_infeasible() -> None:
     path = INPUTS / "frequency-band-on-any-stiffness.toml"
     table = tomllib.loads(path.read_text(encoding="utf-8"))
-    found = laufruhe.solve(path)
-    assert found.status is Status.INFEASIBLE
-    assert found.conflict == ("natural frequencies",)
+    result = laufruhe.solve(path)
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("natural frequencies",)
     # frequencies feel no weight: on every stiffness one stands in the band
     low, high = (si(edge) for edge in table["constraints"][0]["outside"])
     ends = next(k for place in table["mounts"]["places"] for k in place["stiffness"] if isinstance(k, dict))

@@ -16,9 +16,9 @@ INPUTS = Path(__file__).parent / "inputs"
 
 def table(**engine: Any) -> dict[str, Any]:
     """Return the scene with these keys of its engine."""
-    found = tomllib.loads((INPUTS / "optional-shaft-uneven-throws.toml").read_text())
-    rest = {key: value for key, value in found["engine"].items() if key not in engine}
-    return found | {"engine": rest | {key: value for key, value in engine.items() if value is not None}}
+    data = tomllib.loads((INPUTS / "optional-shaft-uneven-throws.toml").read_text())
+    rest = {key: value for key, value in data["engine"].items() if key not in engine}
+    return data | {"engine": rest | {key: value for key, value in engine.items() if value is not None}}
 
 
 def with_shaft(scene: dict[str, Any]) -> dict[str, Any]:

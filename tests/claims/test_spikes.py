@@ -42,9 +42,9 @@ def scene(pressure: np.ndarray, norm: str, folder: Path) -> dict[str, Any]:
     """Return the single with this trace in a file beside it."""
     lines = [f"{720.0 * k / len(pressure):.3f},{value:.6g}" for k, value in enumerate(pressure)]
     (folder / "spike.csv").write_text("\n".join(["angle,pressure", *lines]) + "\n")
-    found = tomllib.loads((INPUTS / "spike.toml").read_text())
-    found["gas"]["file"] = str(folder / "spike.csv")
-    return found | {"objective": {"minimise": f"{norm} roll moment"}}
+    data = tomllib.loads((INPUTS / "spike.toml").read_text())
+    data["gas"]["file"] = str(folder / "spike.csv")
+    return data | {"objective": {"minimise": f"{norm} roll moment"}}
 
 
 def of_design(result: Any, pressure: np.ndarray, norm: str) -> float:

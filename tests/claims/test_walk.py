@@ -47,7 +47,7 @@ def whole_walks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(walk, "SECONDS", 20.0)
 
 
-def told_as_optimum(result: Result) -> Result:
+def marked_optimal(result: Result) -> Result:
     """The design as given, told as the proven optimum."""
     value = result.objective.initial if result.objective is not None else math.nan
     claim = Certificate(Proof.GLOBAL, value * (1.0 - 1e-5), 1e-5, 0.0, "a false bound")
@@ -94,7 +94,7 @@ def is_withheld(result: Result, best: float) -> bool:
 def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
     result = solved(name)
     assert result.objective is not None
-    lie = told_as_optimum(result)
+    lie = marked_optimal(result)
     found = walk.check_by_walk(result.problem, lie, 1.0)
     assert is_withheld(found, result.objective.value)
     assert found.objective is not None
@@ -237,5 +237,5 @@ def test_a_norm_and_a_channel_that_nobody_knows_are_claimed_nothing_false_of(mon
     monkeypatch.setitem(NORMS, norm.name, norm)  # type: ignore[arg-type]
     monkeypatch.setitem(MEASURES, f"{norm.name} {channel}", (CHANNELS[channel], norm))  # type: ignore[arg-type]
     problem = load(RESULTANT.read_text().replace("rms transmitted force", f"{norm.name} {channel}"))
-    found = solve(problem.changed(search=replace(problem.search, starts=1)))
-    assert claims_no_more_than(found, at(problem, BETTER))
+    result = solve(problem.changed(search=replace(problem.search, starts=1)))
+    assert claims_no_more_than(result, at(problem, BETTER))

@@ -101,9 +101,9 @@ laufruhe.files.reader.load = load
 def test_an_interrupt_at_any_moment_is_one_line(code: str, tmp_path: Path) -> None:
     path = written(tmp_path, scenes.TIGHT)
     words = [sys.executable, "-c", code + "from laufruhe.__main__ import main; main()", "solve", str(path)]
-    found = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=LONG, check=False)
-    assert (found.returncode, found.stdout) == (130, "")
-    assert found.stderr == "laufruhe: interrupted, nothing was written\n"
+    process = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=LONG, check=False)
+    assert (process.returncode, process.stdout) == (130, "")
+    assert process.stderr == "laufruhe: interrupted, nothing was written\n"
     assert list(tmp_path.iterdir()) == [path]
 
 

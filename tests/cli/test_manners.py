@@ -50,10 +50,10 @@ def test_every_command_is_documented() -> None:
 def test_output_that_cannot_be_written_is_an_error(here: Path) -> None:
     words = [sys.executable, "-m", "laufruhe", "check", str(SINGLE)]
     with Path("/dev/full").open("w") as full:
-        found = subprocess.run(words, cwd=here, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert found.returncode == 1
-    assert found.stderr.startswith("laufruhe: the output cannot be written (No space left")
-    assert found.stderr.count("\n") == 1
+        process = subprocess.run(words, cwd=here, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert process.returncode == 1
+    assert process.stderr.startswith("laufruhe: the output cannot be written (No space left")
+    assert process.stderr.count("\n") == 1
 
 
 def shell(words: str, here: Path) -> subprocess.CompletedProcess[str]:
@@ -108,10 +108,10 @@ def test_names_of_files_cannot_command_a_screen(here: Path) -> None:
                   ["evaluate", path.name, "--no-plots", "--out", "o\x1b[2J\u202e"],
                   ["init", "n\x1b[2J\u202e.toml", "--from", "vw-ea827-2-0"],
                   ["examples", "tractor-single", "--to", "t\x1b[2J\u202e"]):  # fmt: skip
-        found = run.invoke(app, words)
-        assert found.exit_code == 0
-        assert "\\x1b" in found.output
-        assert all(line.isprintable() for line in found.output.splitlines())
+        outcome = run.invoke(app, words)
+        assert outcome.exit_code == 0
+        assert "\\x1b" in outcome.output
+        assert all(line.isprintable() for line in outcome.output.splitlines())
     (folder,) = (here / "results").iterdir()
     for page in (folder / "report.md", folder / "report.html"):
         assert "\x1b" not in page.read_text(encoding="utf-8")
@@ -133,29 +133,29 @@ def test_a_file_without_permission_is_refused_in_a_line(
     (here / "mine.toml").write_text("", encoding="utf-8")
     monkeypatch.setattr(os, "access", lambda *_, **__: False)
     monkeypatch.setattr(Path, "open", forbidden)
-    found = run.invoke(app, [command, "mine.toml"])
-    assert found.exit_code == 2
-    assert found.stderr == "mine.toml: file: cannot be read (Permission denied); check its permissions\n"
+    outcome = run.invoke(app, [command, "mine.toml"])
+    assert outcome.exit_code == 2
+    assert outcome.stderr == "mine.toml: file: cannot be read (Permission denied); check its permissions\n"
 
 
 def test_quiet_says_nothing_and_writes_all(here: Path) -> None:
-    found = run.invoke(app, ["evaluate", str(SINGLE), "-q", "--no-plots"])
-    assert (found.exit_code, found.output) == (0, "")
+    outcome = run.invoke(app, ["evaluate", str(SINGLE), "-q", "--no-plots"])
+    assert (outcome.exit_code, outcome.output) == (0, "")
     assert (here / "results" / "tractor-single-initial" / "result.json").is_file()
     assert run.invoke(app, ["check", str(SINGLE), "-q"]).output == ""
     assert "does not exist" in run.invoke(app, ["check", "none.toml", "-q"]).output
 
 
 def test_verbose_says_every_step_in_a_line(here: Path) -> None:
-    found = run.invoke(app, ["evaluate", str(SINGLE), "-v", "--no-plots"])
-    assert re.search(r"^ +\d+\.\d s  reading the problem$", found.stderr, re.MULTILINE)
-    assert "reading" not in found.stdout
+    outcome = run.invoke(app, ["evaluate", str(SINGLE), "-v", "--no-plots"])
+    assert re.search(r"^ +\d+\.\d s  reading the problem$", outcome.stderr, re.MULTILINE)
+    assert "reading" not in outcome.stdout
 
 
 def test_quiet_and_verbose_contradict_each_other(here: Path) -> None:
-    found = run.invoke(app, ["check", str(SINGLE), "-q", "-v"])
-    assert found.exit_code == 2
-    assert "-q: is given beside -v" in found.output
+    outcome = run.invoke(app, ["check", str(SINGLE), "-q", "-v"])
+    assert outcome.exit_code == 2
+    assert "-q: is given beside -v" in outcome.output
 
 
 def test_help_describes_every_command_in_one_line() -> None:
@@ -172,10 +172,10 @@ def test_loudness_may_stand_before_the_command(here: Path) -> None:
 
 
 def test_options_before_the_command_are_refused_with_a_remedy(here: Path) -> None:
-    found = run.invoke(app, ["--json", "found.json", "check", str(SINGLE)])
-    assert (found.exit_code, list(here.iterdir())) == (2, [])
+    outcome = run.invoke(app, ["--json", "found.json", "check", str(SINGLE)])
+    assert (outcome.exit_code, list(here.iterdir())) == (2, [])
     assert (
-        found.output
+        outcome.output
         == "laufruhe: --json: belongs after the command; write it there, as in: laufruhe check ... --json\n"
     )
     assert "No such option" in run.invoke(app, ["--nothing", "check", str(SINGLE)]).output
@@ -200,14 +200,14 @@ def test_shells_complete_commands_and_engines(shell: str, here: Path) -> None:
         shell, {"_TYPER_COMPLETE_ARGS": "laufruhe init --from bmw-s8", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
     )
     environment = {**completion_words, "_LAUFRUHE_COMPLETE": f"complete_{shell}"}
-    found = run.invoke(app, [], env=environment, prog_name="laufruhe").stdout
-    assert "bmw-s85" in found
-    assert "buick" not in found
+    output = run.invoke(app, [], env=environment, prog_name="laufruhe").stdout
+    assert "bmw-s85" in output
+    assert "buick" not in output
     if shell == "bash":
         # the command itself is asked once
         words = [sys.executable, "-c", "import sys; sys.argv = ['laufruhe']; from laufruhe.cli import main; main()"]
         alone = subprocess.run(words, env={**os.environ, **environment}, capture_output=True, text=True, timeout=300)
-        assert alone.stdout.split() == found.split()
+        assert alone.stdout.split() == output.split()
 
 
 def test_progress_shows_value_bound_and_gap_of_the_outermost_search() -> None:

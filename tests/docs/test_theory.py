@@ -34,8 +34,8 @@ LABEL = re.compile(r"\*\*([A-Z]\d+[a-z]?)\b|\\tag\{([A-Z]\d+[a-z]?)\}")
 
 def labels() -> Counter[str]:
     """Labels, each with the number of pages that define it."""
-    found = [LABEL.findall(page.read_text(encoding="utf-8")) for page in PAGES]
-    return Counter(label for page in found for label in {bold or tag for bold, tag in page})
+    text = [LABEL.findall(page.read_text(encoding="utf-8")) for page in PAGES]
+    return Counter(label for page in text for label in {bold or tag for bold, tag in page})
 
 
 @pytest.mark.parametrize("name", FIGURES)

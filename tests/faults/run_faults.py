@@ -68,12 +68,12 @@ def main() -> None:
     jobs = int(sys.argv[2]) if len(sys.argv) > 2 else processors()
     log = Path(sys.argv[3]) if len(sys.argv) > 3 else LOG
     log.parent.mkdir(parents=True, exist_ok=True)
-    found = {"check": run("check", 0, count, jobs, log)}
+    tables = {"check": run("check", 0, count, jobs, log)}
     for k, verb in enumerate(("evaluate", "explain"), 1):
-        found[verb] = run(verb, k * 10**7, count // SAMPLE, jobs, log)
+        tables[verb] = run(verb, k * 10**7, count // SAMPLE, jobs, log)
     PAGE.parent.mkdir(parents=True, exist_ok=True)
-    PAGE.write_text(page(found), encoding="utf-8")
-    wrong = [one for of in found.values() for one in of if one.wrong]
+    PAGE.write_text(page(tables), encoding="utf-8")
+    wrong = [one for of in tables.values() for one in of if one.wrong]
     print(f"{len(wrong)} finding(s): {PAGE}")
     sys.exit(bool(wrong))
 

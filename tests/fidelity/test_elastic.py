@@ -120,9 +120,11 @@ def test_travel_by_every_choice() -> None:
     one = replace(problem, points=problem.points[:1])
     sizes = {}
     for mounts in ("frequency", "rigid", "time"):
-        found = evaluate(replace(one, fidelity=Fidelity(samples=96, orders=4, mounts=mounts))).loads[0].mount_travel
-        assert found is not None
-        sizes[mounts] = np.abs(found.sample(96)).max()
+        evaluation = (
+            evaluate(replace(one, fidelity=Fidelity(samples=96, orders=4, mounts=mounts))).loads[0].mount_travel
+        )
+        assert evaluation is not None
+        sizes[mounts] = np.abs(evaluation.sample(96)).max()
     assert sizes["rigid"] == 0.0
     assert sizes["time"] == pytest.approx(sizes["frequency"], rel=0.1)
 

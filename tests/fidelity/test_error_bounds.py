@@ -24,9 +24,9 @@ def _sampling_errors(seed: int) -> tuple[float, float]:
     rng = random.Random(seed)
     problem = random_problem(rng)
     own = replace(problem, fidelity=Fidelity(samples=rng.choice([48, 96, 360, 1440])))
-    found, truth = evaluate(own), objective_value(problem, evaluate(finer(problem, 14401)))
-    value = objective_value(own, found)
-    return abs(value - truth) / value if value else 0.0, objective_error(own, found)
+    evaluation, truth = evaluate(own), objective_value(problem, evaluate(finer(problem, 14401)))
+    value = objective_value(own, evaluation)
+    return abs(value - truth) / value if value else 0.0, objective_error(own, evaluation)
 
 
 @pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 1, 2))

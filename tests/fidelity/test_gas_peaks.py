@@ -168,9 +168,9 @@ def test_a_peak_at_the_cut_off_is_found(samples: int, tmp_path: Path) -> None:
 def test_error_with_gas_is_not_below_the_true_one(seed: int) -> None:
     problem = problem_of_peak(seed)
     angles = QUICK if seed < FAST else ANGLES if seed < USUAL else 5 * ANGLES
-    found = evaluate(problem)
-    value = objective_value(problem, found)
-    stated = objective_error(problem, found)
+    evaluation = evaluate(problem)
+    value = objective_value(problem, evaluation)
+    stated = objective_error(problem, evaluation)
     assert abs(value - truth_of_peak(problem, angles)) <= (stated + 1e-9) * value
     # and it is worth reading
     assert stated < 0.05

@@ -199,9 +199,9 @@ def test_unbalances_of_a_shaft_have_the_same_name_everywhere(names: list[str | N
         weight.update({} if name is None else {"name": name})
     del tables["constraints"]
     tables["balancer_shafts"] = [{"name": "s", "ratio": 2, "position": ["0 mm", "0 mm"], "unbalances": weights}]
-    found = laufruhe.load(tables)
-    assert [rotor.name for rotor in found.engine.rotors if rotor.shaft.name == "s"] == rotor_names
+    problem = laufruhe.load(tables)
+    assert [rotor.name for rotor in problem.engine.rotors if rotor.shaft.name == "s"] == rotor_names
     for k, name in enumerate(rotor_names):
-        other = found.with_values({f"{name}.unbalance": "0.02 kg m"})
+        other = problem.with_values({f"{name}.unbalance": "0.02 kg m"})
         moved = [one.name for one in other.engine.rotors if one.shaft.name == "s" and abs(one.unbalance) > 0.015]
         assert moved == [rotor_names[k]]

@@ -159,13 +159,13 @@ def plain_result(deviation: int) -> Result:
 def test_an_open_crank_is_decided_in_the_numbers_of_the_file(keys: Table, deviation: int) -> None:
     """The optimum is that of plain numbers; its order and throws, written into the file, give it again."""
     engine, tables = open_vee(deviation)
-    plain, found = plain_result(deviation), laufruhe.solve(loaded({**engine, **keys}, **tables))
+    plain, result = plain_result(deviation), laufruhe.solve(loaded({**engine, **keys}, **tables))
     assert plain.objective is not None
-    assert found.objective is not None
-    assert found.objective.value == pytest.approx(plain.objective.value, rel=1e-6)
-    assert found.certificate.kind == plain.certificate.kind
-    assert found.phasing is not None
-    best = found.phasing.ranking[0]
+    assert result.objective is not None
+    assert result.objective.value == pytest.approx(plain.objective.value, rel=1e-6)
+    assert result.certificate.kind == plain.certificate.kind
+    assert result.phasing is not None
+    best = result.phasing.ranking[0]
     written = {
         **engine,
         **keys,
@@ -174,7 +174,7 @@ def test_an_open_crank_is_decided_in_the_numbers_of_the_file(keys: Table, deviat
     }
     again = laufruhe.solve(loaded(written, objective=tables["objective"]))
     assert again.objective is not None
-    assert again.objective.value == pytest.approx(found.objective.value, rel=1e-6)
+    assert again.objective.value == pytest.approx(result.objective.value, rel=1e-6)
     assert plain.phasing is not None
     # neighbours stand side by side along the crank, whatever the numbers of their throws
     assert best.firing_orders[0].neighbours == plain.phasing.ranking[0].firing_orders[0].neighbours

@@ -18,11 +18,11 @@ SINGLE = Path(__file__).parents[2] / "problems" / "single-stroke-offset.toml"
 
 def tables(ratio: Any, **engine: Any) -> dict[str, Any]:
     """The tractor single with a ratio of stroke to bore, its stroke 120 mm and its bore 100 mm."""
-    found = tomllib.loads(SINGLE.read_text(encoding="utf-8"))
-    found["engine"] |= {"stroke": "120 mm", "offset": "0 mm", **engine}
-    found["quantities"] = {"stroke_over_bore": ratio}
-    found["counterweights"][0]["balance_factor"] = 0.5
-    return found
+    data = tomllib.loads(SINGLE.read_text(encoding="utf-8"))
+    data["engine"] |= {"stroke": "120 mm", "offset": "0 mm", **engine}
+    data["quantities"] = {"stroke_over_bore": ratio}
+    data["counterweights"][0]["balance_factor"] = 0.5
+    return data
 
 
 @pytest.mark.parametrize("ratio", [0.8, 1.5])
@@ -63,14 +63,14 @@ def test_an_open_ratio_is_decided_as_the_best_of_those_that_are_given() -> None:
     ],
 )
 def test_quantities_that_cannot_follow_are_refused(ratio: Any, engine: dict[str, Any], said: str) -> None:
-    given = tables(ratio, **engine)
-    given["engine"] = {key: value for key, value in given["engine"].items() if value is not None}
+    settings = tables(ratio, **engine)
+    settings["engine"] = {key: value for key, value in settings["engine"].items() if value is not None}
     with pytest.raises(InputError, match=said):
-        laufruhe.load(given)
+        laufruhe.load(settings)
 
 
 def test_an_unknown_quantity_is_refused() -> None:
-    given = tables(1.0)
-    given["quantities"] = {"stroke_to_bore": 1.0}
+    settings = tables(1.0)
+    settings["quantities"] = {"stroke_to_bore": 1.0}
     with pytest.raises(InputError, match="stroke_over_bore"):
-        laufruhe.load(given)
+        laufruhe.load(settings)

@@ -43,9 +43,9 @@ def problem_pages() -> list[str]:
 
 @pytest.fixture(scope="module")
 def validator() -> jsonschema.Draft7Validator:
-    found = json.loads(schema_file()[1])
-    jsonschema.Draft7Validator.check_schema(found)
-    return jsonschema.Draft7Validator(found)
+    data = json.loads(schema_file()[1])
+    jsonschema.Draft7Validator.check_schema(data)
+    return jsonschema.Draft7Validator(data)
 
 
 def test_shipped_schema_is_the_generated_one() -> None:
@@ -129,8 +129,8 @@ def test_examples_of_the_pages_fit_the_schema(path: Path) -> None:
     for text in EXAMPLE.findall(path.read_text(encoding="utf-8")):
         tables = tomllib.loads(textwrap.dedent(text))
         is_study = "study" in tables
-        found = json.loads(schema_file(is_study=is_study)[1])
-        jsonschema.Draft7Validator(found if "title" in tables else _partial(found)).validate(tables)
+        data = json.loads(schema_file(is_study=is_study)[1])
+        jsonschema.Draft7Validator(data if "title" in tables else _partial(data)).validate(tables)
         if "title" in tables and not is_study:
             assert laufruhe.load(tables).title == tables["title"]
 
@@ -201,9 +201,9 @@ def test_defaults_stand_with_their_units(is_study: bool) -> None:
 
 @pytest.fixture(scope="module")
 def study_validator() -> jsonschema.Draft7Validator:
-    found = json.loads(schema_file(is_study=True)[1])
-    jsonschema.Draft7Validator.check_schema(found)
-    return jsonschema.Draft7Validator(found)
+    data = json.loads(schema_file(is_study=True)[1])
+    jsonschema.Draft7Validator.check_schema(data)
+    return jsonschema.Draft7Validator(data)
 
 
 def test_shipped_study_schema_is_the_generated_one() -> None:

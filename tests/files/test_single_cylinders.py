@@ -22,11 +22,11 @@ GAS: dict[str, Any] = {"model": "seiliger", "peak_pressure": "60 bar", "imep": "
 
 
 def tables(single: list[dict[str, Any]] | None = None, gas: dict[str, Any] | None = None, **engine: Any) -> Any:
-    found = {"title": "x", "engine": {**ENGINE, **engine}, "operating_points": [{"speed": "3000 rpm"}]}
-    found["engine"] = {key: value for key, value in found["engine"].items() if value is not None}
+    settings = {"title": "x", "engine": {**ENGINE, **engine}, "operating_points": [{"speed": "3000 rpm"}]}
+    settings["engine"] = {key: value for key, value in settings["engine"].items() if value is not None}
     if single is not None:
-        found["engine"]["single_cylinders"] = single
-    return {**found, "gas": GAS if gas is None else gas}
+        settings["engine"]["single_cylinders"] = single
+    return {**settings, "gas": GAS if gas is None else gas}
 
 
 def refusal(tables: Any) -> str:

@@ -68,9 +68,9 @@ class TestPlaces:
         shared = {"cycle": "four-stroke", "stroke": "90 mm", "rod_ratio": 0.3, "reciprocating_mass": "0.5 kg"}
         problem_keys = {"title": "t", "operating_points": [{"speed": "3000 rpm"}]}
         engine = {"layout": layout, **own, **shared, "cylinders": maximum}
-        found = laufruhe.load({**problem_keys, "engine": engine}).engine
+        problem = laufruhe.load({**problem_keys, "engine": engine}).engine
         away = laufruhe.load({**problem_keys, "engine": {**engine, "cylinder_spacing": "1 m"}}).engine
-        assert [part.x for part in found.cylinders] == [part.x for part in away.cylinders]
+        assert [part.x for part in problem.cylinders] == [part.x for part in away.cylinders]
         with pytest.raises(laufruhe.InputError, match="cylinder_spacing: is missing"):
             laufruhe.load({**problem_keys, "engine": {**engine, "cylinders": 4, "firing_order": [1, 3, 4, 2]}})
 

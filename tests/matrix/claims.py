@@ -259,8 +259,8 @@ def _fine(result: Result) -> int:
 def _evaluated(problem: Problem, engine: Engine, samples: int) -> tuple[float, bool]:
     """Objective of one design, infinite where it has no loads, and whether limits allow it."""
     try:
-        found = evaluate(problem, engine, samples)
-        return objective_value(problem, found), found.violation(problem.limits) <= STRICTLY
+        evaluation = evaluate(problem, engine, samples)
+        return objective_value(problem, evaluation), evaluation.violation(problem.limits) <= STRICTLY
     except ModelError:
         return math.inf, False
 

@@ -11,10 +11,11 @@ from prove.test_subdivision import boxes
 
 
 def designs(problem: Problem, low, high, seed: int) -> list[float]:
-    generator, given = np.random.default_rng(seed), evaluate(problem)
+    generator, evaluation = np.random.default_rng(seed), evaluate(problem)
     shares = generator.random((6, len(low)))
     return [
-        objective_value(problem, with_mounts(given, problem.design((low + s * (high - low)).tolist()))) for s in shares
+        objective_value(problem, with_mounts(evaluation, problem.design((low + s * (high - low)).tolist())))
+        for s in shares
     ]
 
 

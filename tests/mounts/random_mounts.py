@@ -198,10 +198,10 @@ class Drawn:
 
 def limits_of(drawn: Drawn, problem: Problem) -> list[str]:
     """Limits about what the design as given has."""
-    given, lines = evaluate(problem), []
+    evaluation, lines = evaluate(problem), []
     for k, ((name, *keys), room) in enumerate(zip(drawn.limited_quantities, drawn.room, strict=True)):
         probe = load_text(drawn, [*_limit(name, keys, k), 'min = "1 Hz"' if "frequencies" in name else _probe(name)])
-        values = list(given.values(probe.limits[0].measure))
+        values = list(evaluation.values(probe.limits[0].measure))
         value, side = values[0] * room, "max"
         unit = probe.limits[0].measure.unit
         if name == "natural frequencies outside":

@@ -143,8 +143,8 @@ GAPS = {"none": MOUNTS, "wide": with_stops("6 mm"), "narrow": with_stops("1.5 mm
 def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Path) -> None:
     """Bump stops that are met all over a box, nowhere, and in a part of it (E60)."""
     problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, OBJECTIVES[name])
-    measure, given = problem.objective[0].measure, evaluate(problem)
-    model, generator, ratios = BoxModel(problem, given), np.random.default_rng(1), []
+    measure, evaluation = problem.objective[0].measure, evaluate(problem)
+    model, generator, ratios = BoxModel(problem, evaluation), np.random.default_rng(1), []
     # of loads that are held no operating point is asked
     still = evaluate(replace(problem, points=()))
     for low, high in zip(*boxes(problem, 30, 3), strict=True):
@@ -169,9 +169,9 @@ def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, quant
     tables["load_cases"] = [{"name": "bump", "times_weight": [0.2, 0, -3]}, {"name": "torque", "torque": "350 N m"}]
     tables["constraints"] = [{"limit": quantity, "max": "1 m" if quantity == "static travel" else "1 MN"}]
     problem, generator, ratios = load(tables), np.random.default_rng(1), []
-    given, still = evaluate(problem), evaluate(replace(problem, points=()))
+    evaluation, still = evaluate(problem), evaluate(replace(problem, points=()))
     measure = problem.mount_limits[0].measure
-    model = BoxModel(problem, given)
+    model = BoxModel(problem, evaluation)
     for width in (0.2, 0.05, 0.01, 0.2, 0.05, 0.01):
         centre = model.lower * (model.upper / model.lower) ** generator.random(len(model.lower))
         low, high = (np.clip(centre * (1.0 + side * width), model.lower, model.upper) for side in (-1.0, 1.0))
@@ -243,10 +243,10 @@ def least_stiff(tmp_path_factory):
 
 def _by_evolution(problem) -> float:
     # of loads that are held no operating point is asked
-    given, (limit,) = evaluate(replace(problem, points=())), problem.limits
+    evaluation, (limit,) = evaluate(replace(problem, points=())), problem.limits
 
     def worth(x):
-        design = with_mounts(given, problem.design(np.exp(x).tolist()))
+        design = with_mounts(evaluation, problem.design(np.exp(x).tolist()))
         return objective_value(problem, design) * (1.0 + 100.0 * max(design.check_limit(limit).violation, 0.0))
 
     bounds = [(np.log(d.lower), np.log(d.upper)) for d in problem.decisions]

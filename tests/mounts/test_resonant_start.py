@@ -76,24 +76,26 @@ def test_a_design_off_resonance_is_evaluated_as_ever(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_search_ends_where_it_does_from_elsewhere(tmp_path: Path) -> None:
     objective = FORCE.replace("starts = 4", "starts = 1")
-    found, usual = solve(resonant(tmp_path, objective)), solve(resonant(tmp_path, objective, UNDAMPED))
-    assert found.objective is not None
+    result, usual = solve(resonant(tmp_path, objective)), solve(resonant(tmp_path, objective, UNDAMPED))
+    assert result.objective is not None
     assert usual.objective is not None
-    assert found.certificate is not None
-    assert found.objective.value == pytest.approx(usual.objective.value, rel=1e-5)
-    assert math.isinf(found.objective.initial)
-    assert math.isnan(found.objective.reduction)
+    assert result.certificate is not None
+    assert result.objective.value == pytest.approx(usual.objective.value, rel=1e-5)
+    assert math.isinf(result.objective.initial)
+    assert math.isnan(result.objective.reduction)
     # an infinite start is no scale for a gap
-    assert found.certificate.gap == pytest.approx(1.0 - found.certificate.lower_bound / found.objective.value, rel=1e-6)
-    assert "on a resonance" in repr(found)
-    assert found.message.endswith("nothing damps it")
+    assert result.certificate.gap == pytest.approx(
+        1.0 - result.certificate.lower_bound / result.objective.value, rel=1e-6
+    )
+    assert "on a resonance" in repr(result)
+    assert result.message.endswith("nothing damps it")
 
 
 def test_a_convex_problem_keeps_its_proof(tmp_path: Path) -> None:
-    found = solve(resonant(tmp_path, SAG))
-    assert found.status == "optimal"
-    assert found.objective is not None
-    assert math.isfinite(found.objective.initial)
+    result = solve(resonant(tmp_path, SAG))
+    assert result.status == "optimal"
+    assert result.objective is not None
+    assert math.isfinite(result.objective.initial)
 
 
 def test_a_resonance_that_no_open_number_moves_is_refused(tmp_path: Path) -> None:

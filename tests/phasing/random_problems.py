@@ -153,7 +153,7 @@ class Writer:
     def _measure(self) -> str:
         return f"{self.pick(*NORMS)} {self.pick(*CHANNELS)}"
 
-    def _asked(self) -> str:
+    def _objective(self) -> str:
         terms = []
         for _ in range(int(self.rng.integers(1, 3))):
             orders = self.pick("", "", "\norders = [1]", "\norders = [1, 2]", "\norders = [2]")

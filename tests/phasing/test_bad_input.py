@@ -124,8 +124,8 @@ def test_refused(tmp_path, cylinders, engine, phasing, rest, said):
 
 @pytest.mark.parametrize("key", ["stroke", "reciprocating_mass"])
 def test_open_throws_ask_for_what_given_throws_ask_for(key):
-    given = {"stroke": '"100 mm"', "reciprocating_mass": '"1 kg"'}
-    keys = "\n".join(f"{name} = {value}" for name, value in given.items() if name != key)
+    tables = {"stroke": '"100 mm"', "reciprocating_mass": '"1 kg"'}
+    keys = "\n".join(f"{name} = {value}" for name, value in tables.items() if name != key)
     head = f'layout = "inline"\ncycle = "four-stroke"\ncylinders = 4\nrod_ratio = 0.28\n{keys}'
     rest = '[[operating_points]]\nspeed = "3000 rpm"\n[objective]\nminimise = "rms shaking force"'
     for throws in (OPEN, "throws = [0, 180, 180, 0]\nfiring_order = [1, 3, 4, 2]"):

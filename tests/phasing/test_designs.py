@@ -240,7 +240,7 @@ def test_given_throws_get_the_firing_order_that_gas_likes_best(tmp_path, measure
         engine = f"throws = [0, 90, 200, 300]\nfiring_order = {order}"
         return solve(engines.problem(tmp_path, 4, "four-stroke", engine, wide, rest))
 
-    found = solved('"open"')
+    result = solved('"open"')
     every = []
     for rest_of_order in itertools.permutations((2, 3, 4)):
         try:
@@ -249,10 +249,10 @@ def test_given_throws_get_the_firing_order_that_gas_likes_best(tmp_path, measure
             # these throws cannot fire in this order within two turns
             continue
     assert max(every) > 1.02 * min(every)
-    assert len(every) == found.phasing.ranking[0].order_count
-    assert found.objective.value == pytest.approx(min(every), rel=1e-9)
-    assert found.certificate.kind is Proof.GLOBAL
-    assert found.certificate.lower_bound <= min(every) * (1.0 + 1e-12)
+    assert len(every) == result.phasing.ranking[0].order_count
+    assert result.objective.value == pytest.approx(min(every), rel=1e-9)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.lower_bound <= min(every) * (1.0 + 1e-12)
 
 
 def test_given_throws_that_break_a_limit_are_no_design(tmp_path):
@@ -260,9 +260,9 @@ def test_given_throws_that_break_a_limit_are_no_design(tmp_path):
     limit = '[[constraints]]\nlimit = "maximum mount force"\nmax = "1 N"\n'
     rest = engines.MOUNTS + engines.MOUNT_FORCE + limit
     engine = 'throws = [0, 240, 120]\nfiring_order = "open"'
-    found = solve(engines.problem(tmp_path, 3, "four-stroke", engine, rest=rest))
-    assert found.status is Status.INFEASIBLE
-    assert "limits" in found.message
+    result = solve(engines.problem(tmp_path, 3, "four-stroke", engine, rest=rest))
+    assert result.status is Status.INFEASIBLE
+    assert "limits" in result.message
 
 
 @pytest.mark.parametrize("order", [1, 2])

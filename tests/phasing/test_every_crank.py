@@ -72,16 +72,16 @@ def test_the_best_of_all_even_cranks(tmp_path, seed):
         for throws in even_cranks(phasing, geometry):
             crank = phasing.problem_of(Candidate(throws, None, *geometry))
             values.append(objective_value(crank, evaluate(crank)))
-    found = solve(problem)
+    result = solve(problem)
     if not values:
-        assert found.objective is None
+        assert result.objective is None
         return
-    scale = 1e-3 * found.objective.initial + 1e-6
-    assert found.objective.value == pytest.approx(min(values), rel=1e-3, abs=scale * 1e-3)
-    assert found.certificate.kind is Proof.GLOBAL
-    assert found.certificate.lower_bound <= min(values) * (1.0 + 1e-9) + 1e-6 * scale
-    for entry in found.phasing.ranking:
+    scale = 1e-3 * result.objective.initial + 1e-6
+    assert result.objective.value == pytest.approx(min(values), rel=1e-3, abs=scale * 1e-3)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-9) + 1e-6 * scale
+    for entry in result.phasing.ranking:
         assert min(abs(entry.value - value) for value in values) <= 1e-3 * entry.value + 1e-3 * scale + 1e-9
         if entry.proven:
             better = sum(value < entry.value * (1.0 - 3e-4) - scale for value in values)
-            assert better == 0 or found.phasing.ranking.index(entry) > 0
+            assert better == 0 or result.phasing.ranking.index(entry) > 0

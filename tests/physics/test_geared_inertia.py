@@ -99,8 +99,8 @@ def test_a_share_is_decided_with_unbalances_and_proven(twin: tuple[Problem, Resu
     """Check by a grid of unbalance and share that no design is better, at even and at uneven speed."""
     problem, result = twin
     if inertia is not None:
-        own = {"samples": 240, "crank_inertia": inertia}
-        problem = problem_of(fidelity=own, objective={"minimise": "rms mount force"})
+        tables = {"samples": 240, "crank_inertia": inertia}
+        problem = problem_of(fidelity=tables, objective={"minimise": "rms mount force"})
         result = laufruhe.solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
     bounds = [(d.lower, d.upper) for d in problem.decisions]

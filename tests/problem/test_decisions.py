@@ -252,7 +252,7 @@ def test_loads_change_by_those_of_the_rotors_decided(folder: Path, value: comple
 def test_the_earlier_name_of_the_balance_factor_is_read_as_before(tmp_path: Path) -> None:
     text = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
     earlier = load(written(tmp_path, changed(text, "balance_factor", "balance_fraction")))
-    own = load(PROBLEMS / "tractor-single.toml")
+    problem = load(PROBLEMS / "tractor-single.toml")
     assert [decision.name for decision in earlier.decisions] == ["web.balance_fraction"]
-    assert [replace(d, name="") for d in earlier.decisions] == [replace(d, name="") for d in own.decisions]
-    assert earlier.engine.rotors == own.engine.rotors
+    assert [replace(d, name="") for d in earlier.decisions] == [replace(d, name="") for d in problem.decisions]
+    assert earlier.engine.rotors == problem.engine.rotors

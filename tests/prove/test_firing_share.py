@@ -53,9 +53,9 @@ def test_no_even_star_with_any_weights_goes_under_it(name: str, quantity: str, e
 @pytest.mark.slow
 def test_a_six_in_line_reaches_it() -> None:
     own = problem("inline", cylinders=6)
-    found = solve(own)
-    assert found.objective.value == pytest.approx(firing_bound(own, found.final), rel=1e-6)
-    assert str(found.certificate.kind) == "global"
+    result = solve(own)
+    assert result.objective.value == pytest.approx(firing_bound(own, result.final), rel=1e-6)
+    assert str(result.certificate.kind) == "global"
 
 
 def test_shafts_that_turn_with_the_firing_leave_nothing_known() -> None:

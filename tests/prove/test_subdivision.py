@@ -75,7 +75,7 @@ weight = 1e4""",
 }
 
 
-def asked_for(folder: Path, text: str, more: str = "", mounts: str = DAMPED) -> Problem:
+def stiffness_problem(folder: Path, text: str, more: str = "", mounts: str = DAMPED) -> Problem:
     head = text if text.startswith("[[") else f"[objective]\n{text}"
     gas = changed(TWO_POINTS, ('stroke = "120 mm"', 'stroke = "120 mm"\nbore = "100 mm"')) + GAS
     return problem_of(folder, gas, BLOCK, mounts, head + "\n" + more)
@@ -92,10 +92,10 @@ def boxes(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarr
 
 @pytest.mark.parametrize("name", first_fast(OBJECTIVES, 2))
 def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, OBJECTIVES[name])
+    problem = stiffness_problem(tmp_path, OBJECTIVES[name])
     assert is_stiffness_problem(problem)
-    given = evaluate(problem)
-    search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, given))
+    evaluation = evaluate(problem)
+    search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, evaluation))
     low, high = boxes(problem, 25, 1)
     bounds, _ = search.bounds(low, high)
     generator = np.random.default_rng(2)
@@ -105,7 +105,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
         found = []
         for share in (*generator.random((3, len(below))), *corners):
             engine = problem.design((below + share * (above - below)).tolist())
-            found.append(objective_value(problem, with_mounts(given, engine)))
+            found.append(objective_value(problem, with_mounts(evaluation, engine)))
         assert bound <= min(found) * (1.0 + 1e-9)
         tight.append(bound / min(found))
     assert max(tight) > 0.99
@@ -113,7 +113,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
 
 
 def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, OBJECTIVES["mean"])
+    problem = stiffness_problem(tmp_path, OBJECTIVES["mean"])
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     centre = np.array([d.start for d in problem.mount_decisions])
     value, lines = objective_value(problem, evaluate(problem)), search.model.loaded_orders(measure)
@@ -164,7 +164,7 @@ def test_no_response_that_is_linear_in_a_box_is_under_the_bound_of_its_norm(norm
 
 
 def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, 'minimise = "static sag"')
+    problem = stiffness_problem(tmp_path, 'minimise = "static sag"')
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     low, high = boxes(problem, 40, 5)
     found = sag_under(search.model, measure, low, high)
@@ -177,7 +177,7 @@ def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
 def test_a_box_whose_softest_corner_carries_nothing_has_a_line_under_its_sag(tmp_path: Path) -> None:
     """No design of it is under the line, which is zero where the middle carries nothing either."""
     bottomless = changed(MOUNTS, *[('"20 N/mm", "4000 N/mm"', '"0 N/mm", "4000 N/mm"')] * 2)
-    problem = asked_for(tmp_path, 'minimise = "static sag"', mounts=bottomless)
+    problem = stiffness_problem(tmp_path, 'minimise = "static sag"', mounts=bottomless)
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     high = np.array([search.model.upper, 0.0 * search.model.upper])
     found = sag_under(search.model, measure, 0.0 * high, high)
@@ -222,15 +222,15 @@ max = "6000 N"
 
 @pytest.mark.slow
 def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, OBJECTIVES["rms"], LIMITS)
-    given = evaluate(problem)
+    problem = stiffness_problem(tmp_path, OBJECTIVES["rms"], LIMITS)
+    evaluation = evaluate(problem)
     low, high = boxes(problem, 60, 3)
     bounds, _ = StiffnessBoxes(problem, 0.0).bounds(low, high)
     generator = np.random.default_rng(4)
     allowed_ones = 0
     for below, above, bound in zip(low, high, bounds, strict=True):
         engine = problem.design(generator.uniform(below, above).tolist())
-        design = with_mounts(given, engine)
+        design = with_mounts(evaluation, engine)
         broken = any(design.check_limit(limit).violation > 0.0 for limit in problem.mount_limits)
         broken |= any(design.value(limit.measure) > limit.maximum for limit in problem.load_limits)
         allowed_ones += not broken

@@ -35,10 +35,10 @@ unit = pint.UnitRegistry()
 
 def problem_tables(name: str) -> dict[str, Any]:
     """Tables of a ready problem; a test of a study is skipped."""
-    found = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))
-    if "study" in found:
+    data = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))
+    if "study" in data:
         pytest.skip("a study has no engine")
-    return found
+    return data
 
 
 def table_functions(place: Place) -> list[Callable[..., Any]]:

@@ -45,14 +45,14 @@ def test_a_callback_sees_the_search_and_ends_it(caplog: pytest.LogCaptureFixture
         return bool(progress.design)
 
     with caplog.at_level(logging.INFO, "laufruhe"):
-        found = laufruhe.solve("powertrain-joined-springs", callback=stop)
-    assert found.status.has_design
-    assert found.certificate is not None
-    assert found.certificate.method.endswith("stopped at the time limit")
+        result = laufruhe.solve("powertrain-joined-springs", callback=stop)
+    assert result.status.has_design
+    assert result.certificate is not None
+    assert result.certificate.method.endswith("stopped at the time limit")
     assert [progress.time for progress in seen] == sorted(progress.time for progress in seen)
     assert seen[-1].design
-    assert found.history
-    assert caplog.messages == [progress.text for progress in found.history]
+    assert result.history
+    assert caplog.messages == [progress.text for progress in result.history]
 
 
 @pytest.mark.slow

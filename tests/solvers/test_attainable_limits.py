@@ -169,9 +169,9 @@ OPEN = {"between": ["50 N/mm", "800 N/mm"], "start": "300 N/mm"}
 def mounts_of(front: dict[str, Any], rear: Any = OPEN) -> dict[str, Any]:
     """Two pairs of mounts, one open number of each or more."""
     front = {"name": "front", "position": POSITIONS[0], "stiffness": ["100 N/mm", "100 N/mm", OPEN]} | front
-    own = {"name": "rear", "position": POSITIONS[2], "stiffness": ["100 N/mm", "100 N/mm", rear]}
+    tables = {"name": "rear", "position": POSITIONS[2], "stiffness": ["100 N/mm", "100 N/mm", rear]}
     return {"kind": "elastic", "loss_factor": 0.1,
-            "places": [front, {"mirror_of": "front"}, own, {"mirror_of": "rear"}]}  # fmt: skip
+            "places": [front, {"mirror_of": "front"}, tables, {"mirror_of": "rear"}]}  # fmt: skip
 
 
 @pytest.mark.slow
@@ -240,7 +240,7 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
     assert [row[0] for row in grid.rows] == ["value reached", *written["nearest"]["decisions"]]
 
 
-def told_of(problem: Problem, status: Status, seconds: float | None = None) -> Result:
+def result_with_reach(problem: Problem, status: Status, seconds: float | None = None) -> Result:
     """Return the result with attainable limits, as if a method had ended with this status."""
     found = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
     with limit_time(seconds):
@@ -251,7 +251,7 @@ def told_of(problem: Problem, status: Status, seconds: float | None = None) -> R
 def test_a_design_that_was_overlooked_is_the_result() -> None:
     """Whatever a method says: what the exact model shows to keep all limits is a design."""
     for status in (Status.FAILED, Status.INFEASIBLE):
-        found = told_of(problem_of([LIGHT | {"max": "2 kg"}, QUIET | {"max": "2 kN"}]), status)
+        found = result_with_reach(problem_of([LIGHT | {"max": "2 kg"}, QUIET | {"max": "2 kN"}]), status)
         assert found.status is Status.FEASIBLE
         assert found.final.violation(found.problem.limits) <= 1e-5
         assert found.objective.name == "mean mount force"
@@ -262,7 +262,7 @@ def test_a_design_that_was_overlooked_is_the_result() -> None:
 
 
 def test_a_failed_search_is_infeasible_by_its_bound() -> None:
-    found = told_of(problem_of([LIGHT, QUIET]), Status.FAILED)
+    found = result_with_reach(problem_of([LIGHT, QUIET]), Status.FAILED)
     assert found.status is Status.INFEASIBLE
     assert set(found.conflict) == {"light", "quiet"}
     assert "none that meets the other limits meets 'quiet'" in found.message
@@ -272,7 +272,7 @@ def test_a_failed_search_is_infeasible_by_its_bound() -> None:
 
 
 def test_nothing_is_looked_at_when_time_is_over() -> None:
-    found = told_of(SCENES["vee"], Status.INFEASIBLE, 1e-9)
+    found = result_with_reach(SCENES["vee"], Status.INFEASIBLE, 1e-9)
     assert [each.why for each in found.reached] == [LONG]
     assert all(math.isnan(each.value) for each in found.reached)
     assert "no time left" in attainable(found)[0]

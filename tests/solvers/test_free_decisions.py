@@ -155,10 +155,10 @@ def holding(problem: Problem, k: int, size: float) -> Problem:
 def test_unchecked_results_claim_no_free_decisions() -> None:
     assert solve(problem_of("mean mount force", TWINS)).free is None
     moving = load(PROBLEMS / "tractor-four-shaft-heights.toml")
-    found = solve(replace(problem_of("mean mount force", TWINS)))
-    assert free_decisions(replace(found, problem=moving)) is None
-    assert as_dict(found)["free_decisions"] is None
-    assert not decisions(found)[0].note
+    result = solve(replace(problem_of("mean mount force", TWINS)))
+    assert free_decisions(replace(result, problem=moving)) is None
+    assert as_dict(result)["free_decisions"] is None
+    assert not decisions(result)[0].note
 
 
 def test_prices_within_the_accuracy_are_none() -> None:

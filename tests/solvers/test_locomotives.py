@@ -101,10 +101,10 @@ def test_turned_to_the_other_side_of_the_track() -> None:
     tables = dict(laufruhe.files.reader.tables_and_path(PROBLEMS / "locomotive-two-cylinder.toml")[0])
     for part in tables["engine"]["slider_cranks"]:
         part["bank_angle"], part["throw"] = -90, part["throw"] - 180
-    turned, given = laufruhe.evaluate(tables), laufruhe.evaluate(PROBLEMS / "locomotive-two-cylinder.toml")
+    turned, result = laufruhe.evaluate(tables), laufruhe.evaluate(PROBLEMS / "locomotive-two-cylinder.toml")
     for name in ("maximum hammer blow", "maximum surging force", "maximum swaying couple"):
         one, other = (
-            next(d.final.value(m) for m in d.problem.measures if m.name.startswith(name)) for d in (turned, given)
+            next(d.final.value(m) for m in d.problem.measures if m.name.startswith(name)) for d in (turned, result)
         )
         assert one == pytest.approx(other, rel=1e-9)
 

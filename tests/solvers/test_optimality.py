@@ -316,9 +316,9 @@ def test_a_limit_that_nothing_open_acts_on_changes_nothing() -> None:
     free = solve(four())
     whole = free.final.value(roll)
     for over in (3e-6, -3e-6):
-        found = solve(four(limits=(Limit("roll", roll, maximum=whole * (1.0 - over)),)))
-        assert found.status is Status.OPTIMAL
-        assert found.objective.value == pytest.approx(free.objective.value, rel=1e-6)
-        assert found.certificate.lower_bound <= found.objective.value * (1.0 + 1e-9)
+        result = solve(four(limits=(Limit("roll", roll, maximum=whole * (1.0 - over)),)))
+        assert result.status is Status.OPTIMAL
+        assert result.objective.value == pytest.approx(free.objective.value, rel=1e-6)
+        assert result.certificate.lower_bound <= result.objective.value * (1.0 + 1e-9)
     broken = solve(four(limits=(Limit("roll", roll, maximum=whole * (1.0 - 1e-3)),)))
     assert (broken.status, broken.conflict) == (Status.INFEASIBLE, ("roll",))

@@ -158,13 +158,13 @@ def test_masses_at_an_uneven_speed_are_decided_locally(tmp_path: Path) -> None:
     """No mass of a grid is better."""
     text = VEE + 'crank_inertia = "1 kg m^2"\n[search]\nstarts = 1\n' + objective("mean mount force")
     problem = loaded(tmp_path, text)
-    found = laufruhe.solve(problem)
-    assert found.certificate.kind is Proof.LOCAL
-    assert found.certificate.lower_bound == 0.0
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is Proof.LOCAL
+    assert result.certificate.lower_bound == 0.0
     (decision,) = problem.decisions
     for mass in np.linspace(decision.lower, decision.upper, 7):
         other = evaluate(problem, problem.design([float(mass)]))
-        assert found.objective.value <= objective_value(problem, other) * (1.0 + 1e-6)
+        assert result.objective.value <= objective_value(problem, other) * (1.0 + 1e-6)
 
 
 @pytest.mark.slow
@@ -207,13 +207,13 @@ radius = "60 mm"
 [objective]
 terms = [{ quantity = "mean shaking force" }, { quantity = "mean rocking couple" }]
 """
-    found = laufruhe.solve(loaded(tmp_path, text))
-    assert next(d.value for d in found.decisions if d.name == "reciprocating mass") == pytest.approx(0.2, abs=1e-6)
+    result = laufruhe.solve(loaded(tmp_path, text))
+    assert next(d.value for d in result.decisions if d.name == "reciprocating mass") == pytest.approx(0.2, abs=1e-6)
     each = (
         laufruhe.solve(loaded(tmp_path, changed(text, '"open"', throws))).objective.value
         for throws in ("[0, 180, 180, 0]", "[0, 180, 0, 180]", "[0, 0, 180, 180]")
     )
-    assert found.objective.value == pytest.approx(min(each), rel=1e-4)
+    assert result.objective.value == pytest.approx(min(each), rel=1e-4)
 
 
 def test_cylinders_with_a_mass_of_their_own_do_not_follow(tmp_path: Path) -> None:

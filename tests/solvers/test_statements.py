@@ -65,17 +65,17 @@ def test_the_statement_in_cvxpy_has_the_optimum_of_the_package(name: str) -> Non
     # a steep price makes more of the 1e-6 to which solvers keep limits, and designs may violate one by 1e-5 of it
     accuracy = 1e-5 if problem.limits else 1e-6
     assert program.value == pytest.approx(affine.objective(optimum.x), rel=accuracy, abs=level)
-    own = laufruhe.solve(problem)
-    assert own.objective is not None
-    assert own.certificate is not None
+    result = laufruhe.solve(problem)
+    assert result.objective is not None
+    assert result.certificate is not None
     proven = laufruhe.certify(problem, program.values, program.multipliers)
     assert proven.objective is not None
     assert proven.certificate is not None
     assert proven.certificate.kind is not Proof.NONE
-    same = objective_value(problem, replace(own.final, samples=proven.final.samples))
-    gap = max(own.certificate.gap, proven.certificate.gap)
+    same = objective_value(problem, replace(result.final, samples=proven.final.samples))
+    gap = max(result.certificate.gap, proven.certificate.gap)
     assert proven.objective.value == pytest.approx(same, rel=accuracy + gap, abs=level)
-    lower = max(own.certificate.lower_bound, proven.certificate.lower_bound)
+    lower = max(result.certificate.lower_bound, proven.certificate.lower_bound)
     assert min(same, proven.objective.value) >= lower * (1.0 - (accuracy if problem.limits else 1e-9)) - level
 
 
@@ -137,22 +137,22 @@ def test_own_constraints_hold_and_cost() -> None:
 @pytest.mark.parametrize("solver", ["SCS", "clarabel"])
 def test_a_named_solver_decides_and_the_proof_stays(solver: str) -> None:
     problem = ready("twin-parallel-270")
-    own, named = laufruhe.solve(problem), laufruhe.solve(problem, solver=solver)
-    assert own.objective is not None
+    result, named = laufruhe.solve(problem), laufruhe.solve(problem, solver=solver)
+    assert result.objective is not None
     assert named.objective is not None
     assert named.certificate is not None
     assert solver.upper() in named.certificate.method
     assert named.certificate.kind is Proof.GLOBAL
-    assert named.objective.value == pytest.approx(own.objective.value, rel=1e-6)
+    assert named.objective.value == pytest.approx(result.objective.value, rel=1e-6)
 
 
 def test_a_linear_problem_needs_a_linear_solver_only() -> None:
     vertical = laufruhe.own_measure("vertical force", load=lambda forces: forces[..., 2:])
     problem = ready("geared-twin").with_objective(vertical)
-    own, named = laufruhe.solve(problem), laufruhe.solve(problem, solver="HIGHS")
-    assert own.objective is not None
+    result, named = laufruhe.solve(problem), laufruhe.solve(problem, solver="HIGHS")
+    assert result.objective is not None
     assert named.objective is not None
-    assert named.objective.value == pytest.approx(own.objective.value, rel=1e-6)
+    assert named.objective.value == pytest.approx(result.objective.value, rel=1e-6)
 
 
 def test_a_solver_that_does_not_fit_is_refused() -> None:
@@ -240,9 +240,9 @@ def test_multipliers_of_another_form_are_refused() -> None:
 
 def test_a_design_that_is_no_optimum_is_never_called_one() -> None:
     problem = ready("tractor-single").open("engine.rod_ratio", 0.2, 0.3).changed(search=Search(starts=1))
-    own, proven = laufruhe.solve(problem), laufruhe.certify(problem, {})
-    assert own.certificate is not None
-    assert own.certificate.kind is Proof.LOCAL
+    result, proven = laufruhe.solve(problem), laufruhe.certify(problem, {})
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.LOCAL
     assert proven.certificate is not None
     assert proven.certificate.kind is Proof.NONE
 

@@ -79,9 +79,9 @@ def test_solve_by_command(tmp_path: Path) -> None:
     path, out = PROBLEMS / "vee-eight-open.toml", tmp_path / "out"
     words = ["solve", str(path), "--time-limit", "0.001", "--out", str(out), "--no-plots"]
     assert CliRunner().invoke(app, words).exit_code == 0
-    found = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    assert found["status"] == "feasible"
-    assert TIME_LIMIT_NOTE in found["certificate"]["method"]
+    data = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert data["status"] == "feasible"
+    assert TIME_LIMIT_NOTE in data["certificate"]["method"]
 
 
 SWEEP = f"""

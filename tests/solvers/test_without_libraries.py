@@ -22,8 +22,8 @@ print(laufruhe.solve(sys.argv[1]).status)
 def test_counterweights_and_shafts_are_decided_with_no_library_but_the_solver_of_cones() -> None:
     """Check that a solve imports no heavy library except the cone solver."""
     path = str(PROBLEMS / "tractor-four-lanchester.toml")
-    found = subprocess.run([sys.executable, "-c", QUICK, path], check=True, capture_output=True, text=True)
-    assert found.stdout == "optimal\n"
+    process = subprocess.run([sys.executable, "-c", QUICK, path], check=True, capture_output=True, text=True)
+    assert process.stdout == "optimal\n"
 
 
 @pytest.mark.slow
@@ -78,12 +78,12 @@ def test_a_plain_installation_says_what_each_call_needs(tmp_path: Path) -> None:
     (tmp_path / name).write_text((PROBLEMS / name).read_text(encoding="utf-8"), encoding="utf-8")
     names = ("tractor-four-lanchester", "powertrain-torque-roll", "inline-nine-uneven")
     paths = [str(PROBLEMS / f"{name}.toml") for name in names]
-    found = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PLAIN, *paths, "out"], check=True, capture_output=True, text=True, cwd=tmp_path
     )
     cvxpy = "the Python library cvxpy is missing; pip install cvxpy-base"
     casadi = "the Python library casadi is missing; pip install casadi"
-    assert found.stdout.splitlines() == [
+    assert process.stdout.splitlines() == [
         cvxpy, casadi, cvxpy, casadi,
         "0 ", "0 ", "counterweight fraction",
         "is a spreadsheet, and the Python library openpyxl is missing; pip install openpyxl",

@@ -44,9 +44,9 @@ def test_an_open_crank_is_decided_in_its_new_size() -> None:
     drawn = problem("inline", 3, objective=FORCE)
     rebuilt = at_equal_power(drawn, 4)
     assert rebuilt.phasing is not None
-    found, scaled = laufruhe.solve(drawn), laufruhe.solve(rebuilt)
-    assert scaled.objective.value == pytest.approx(found.objective.value * 4.0 / 3.0, rel=2e-3)
-    small, large = (result.final.engine.slider_cranks for result in (found, scaled))
+    solution, scaled = laufruhe.solve(drawn), laufruhe.solve(rebuilt)
+    assert scaled.objective.value == pytest.approx(solution.objective.value * 4.0 / 3.0, rel=2e-3)
+    small, large = (result.final.engine.slider_cranks for result in (solution, scaled))
     assert [part.x for part in large] == pytest.approx([part.x * (4.0 / 3.0) ** 0.5 for part in small])
     assert large[0].bore == pytest.approx(0.1 * (4.0 / 3.0) ** 0.5)
 

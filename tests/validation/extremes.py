@@ -138,12 +138,12 @@ def balanced_engines() -> Entry:
 
 def starts_at_the_optimum() -> Entry:
     machine = tractor.engine([0, 120, 240, 240, 120, 0], [tractor.web("front", 0.3), tractor.web("rear", -0.3)])
-    found = solve(tractor.problem(machine, ["front", "rear"]))
+    result = solve(tractor.problem(machine, ["front", "rear"]))
     return Entry(
         "optimiser started at the optimum of a balanced six",
         "no counterweight helps",
         "unbalances decided are 0.0",
-        _worst([abs(rotor.unbalance) for rotor in found.final.engine.rotors]),
+        _worst([abs(rotor.unbalance) for rotor in result.final.engine.rotors]),
         0.0,
     )
 
@@ -299,18 +299,18 @@ def _bounded(big: float, small: float) -> tuple[float, float]:
     problem = tractor.problem(machine, ["plus", "minus"], objective=(force,))
     free = tuple(replace(d, set=Sector(upper)) for d, upper in zip(problem.decisions, (big, small), strict=True))
     problem = replace(problem, decisions=free)
-    found = solve(problem)
+    result = solve(problem)
     # the second order turns half forwards and half backwards; only `small` of the latter can go
     each = tractor.MASS * tractor.RADIUS * tractor.LAMBDA / 2.0
     best = min(small, each)
     minimum = abs(each - best) * (2.0 * tractor.SPEED) ** 2
-    assert found.objective is not None
-    assert found.certificate is not None
-    true_gap = (found.objective.value - minimum) / found.objective.value if minimum > 0.0 else 0.0
-    plus, minus = (abs(rotor.unbalance) for rotor in found.final.engine.rotors)
+    assert result.objective is not None
+    assert result.certificate is not None
+    true_gap = (result.objective.value - minimum) / result.objective.value if minimum > 0.0 else 0.0
+    plus, minus = (abs(rotor.unbalance) for rotor in result.final.engine.rotors)
     faint = minus == 0.0 and best <= 1e-6 * (each - best)
     errors = [abs(plus / each - 1.0), 0.0 if faint else abs(minus / best - 1.0)]
-    return max(errors), max(true_gap - found.certificate.gap - 1e-9, 0.0)
+    return max(errors), max(true_gap - result.certificate.gap - 1e-9, 0.0)
 
 
 def no_damping_near_resonance() -> Entry:
@@ -378,8 +378,8 @@ def many_optima() -> Entry:
         [("plus", 2.0), ("again", 2.0), ("minus", -2.0), ("more", -2.0)])]  # fmt: skip
     machine = replace(tractor.engine([0, 180, 180, 0], rotors), mounts=())
     force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
-    found = solve(tractor.problem(machine, [r.name for r in rotors], objective=(force,)))
-    total = sum(abs(rotor.unbalance) for rotor in found.final.engine.rotors)
+    result = solve(tractor.problem(machine, [r.name for r in rotors], objective=(force,)))
+    total = sum(abs(rotor.unbalance) for rotor in result.final.engine.rotors)
     minimum = tractor.MASS * tractor.RADIUS * tractor.LAMBDA
     return Entry(
         "two shafts in one place: a plane of optima",

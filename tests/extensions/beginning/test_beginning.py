@@ -47,17 +47,17 @@ def test_init_writes_a_problem_that_loads(here: Path, name: str) -> None:
 
 def test_init_leaves_what_is_there(here: Path) -> None:
     (here / "problem.toml").write_text("mine", encoding="utf-8")
-    found = run.invoke(app, ["init", "--from", "bmw-b48"])
-    assert found.exit_code == 2
-    assert "problem.toml: exists with other contents" in found.output
+    outcome = run.invoke(app, ["init", "--from", "bmw-b48"])
+    assert outcome.exit_code == 2
+    assert "problem.toml: exists with other contents" in outcome.output
     assert [path.name for path in here.iterdir()] == ["problem.toml"]
 
 
 @pytest.mark.parametrize("typed", ["", "\nMine\n"])
 def test_init_without_all_answers_says_what_to_do(here: Path, typed: str) -> None:
-    found = run.invoke(app, ["init"], input=typed)
-    assert (found.exit_code, list(here.iterdir())) == (2, [])
-    assert "but the input ended at" in found.stderr
+    outcome = run.invoke(app, ["init"], input=typed)
+    assert (outcome.exit_code, list(here.iterdir())) == (2, [])
+    assert "but the input ended at" in outcome.stderr
 
 
 def answered(*answers: str) -> str:
@@ -87,8 +87,8 @@ def answered(*answers: str) -> str:
     ],
 )  # fmt: skip
 def test_init_puts_answers_into_the_file(here: Path, answers: list[str], keys: dict[str, object]) -> None:
-    found = run.invoke(app, ["init"], input=answered(*answers))
-    assert found.exit_code == 0, found.output
+    outcome = run.invoke(app, ["init"], input=answered(*answers))
+    assert outcome.exit_code == 0, outcome.output
     assert load(here / "problem.toml").objective
     engine = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))["engine"]
     assert {key: engine.get(key) for key in keys} == keys
@@ -133,10 +133,10 @@ FOUR = ["", "", "", "", "", "1-3-4-2"]
 def test_a_bad_answer_is_explained_and_asked_again(
     here: Path, answers: list[str], said: str, key: str, value: object
 ) -> None:
-    found = run.invoke(app, ["init"], input=answered(*answers))
-    assert found.exit_code == 0, found.output
-    assert said in found.output
-    assert "draft" not in found.output
+    outcome = run.invoke(app, ["init"], input=answered(*answers))
+    assert outcome.exit_code == 0, outcome.output
+    assert said in outcome.output
+    assert "draft" not in outcome.output
     assert tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))["engine"][key] == value
 
 
@@ -161,17 +161,17 @@ def test_a_throw_carries_the_big_ends_of_all_its_rods(here: Path, answers: list[
 
 
 def test_an_unknown_source_is_asked_again(here: Path) -> None:
-    found = run.invoke(app, ["init"], input="bmw-b49\n" + answered())
-    assert (found.exit_code, "did you mean 'bmw-b48'?" in found.output) == (0, True)
+    outcome = run.invoke(app, ["init"], input="bmw-b49\n" + answered())
+    assert (outcome.exit_code, "did you mean 'bmw-b48'?" in outcome.output) == (0, True)
 
 
 @pytest.mark.parametrize(("name", "cylinders"), [("V8", 8), ("inline six", 6), ("270 twin", 2)])
 def test_a_layout_is_a_source(here: Path, name: str, cylinders: int) -> None:
-    found = run.invoke(app, ["init"], input="\n".join(["V7", name, "Mine", *[""] * 5, *[""] * 30]))
-    assert (found.exit_code, "is no multiple of the 2 banks" in found.output) == (0, True)
+    outcome = run.invoke(app, ["init"], input="\n".join(["V7", name, "Mine", *[""] * 5, *[""] * 30]))
+    assert (outcome.exit_code, "is no multiple of the 2 banks" in outcome.output) == (0, True)
     tables = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))
     assert tables["engine"]["cylinders"] == cylinders
-    assert "Layout, or a name" not in found.output
+    assert "Layout, or a name" not in outcome.output
     is_vee = tables["engine"]["layout"] == "vee"
     assert any("bank_stagger" in note for note in tables["assumptions"]) == is_vee
 
@@ -179,8 +179,8 @@ def test_a_layout_is_a_source(here: Path, name: str, cylinders: int) -> None:
 def test_an_answer_can_be_changed(here: Path) -> None:
     # the first question has none before it; a layout sets the number of cylinders, which is asked once it is gone
     answers = ["<", "V6", "<", "inline", "", "<", "two-stroke", "3", "", "", "1-2-3", "<", "1-3-2"]
-    found = run.invoke(app, ["init"], input=answered(*answers))
-    assert found.exit_code == 0, found.output
+    outcome = run.invoke(app, ["init"], input=answered(*answers))
+    assert outcome.exit_code == 0, outcome.output
     engine = tomllib.loads((here / "problem.toml").read_text(encoding="utf-8"))["engine"]
     keys = ("layout", "cycle", "cylinders", "firing_order")
     assert [engine[key] for key in keys] == ["inline", "two-stroke", 3, [1, 3, 2]]
@@ -211,8 +211,8 @@ def test_balancer_shafts_turn_as_the_free_loads(here: Path, answers: list[str], 
 
 def test_an_existing_file_is_refused_before_questions(here: Path) -> None:
     (here / "problem.toml").write_text("mine", encoding="utf-8")
-    found = run.invoke(app, ["init"])
-    assert (found.exit_code, found.output.count("\n")) == (2, 1)
+    outcome = run.invoke(app, ["init"])
+    assert (outcome.exit_code, outcome.output.count("\n")) == (2, 1)
 
 
 def test_ctrl_c_at_a_question_ends_as_everywhere(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,16 +220,16 @@ def test_ctrl_c_at_a_question_ends_as_everywhere(here: Path, monkeypatch: pytest
     monkeypatch.setattr(
         "laufruhe.extensions.beginning.questions.sys", SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
     )
-    found = run.invoke(app, ["init"], input="\n")
-    assert found.exit_code == 130
-    assert found.stderr == "\nlaufruhe: interrupted, nothing was written\n"
+    outcome = run.invoke(app, ["init"], input="\n")
+    assert outcome.exit_code == 130
+    assert outcome.stderr == "\nlaufruhe: interrupted, nothing was written\n"
     assert list(here.iterdir()) == []
 
 
 def test_a_new_folder_is_made_and_the_next_command_can_be_pasted(here: Path) -> None:
-    found = run.invoke(app, ["init", "new folder/it's mine.toml", "--from", "bmw-b48"])
-    assert found.exit_code == 0
-    *_, verb, named = shlex.split(found.output.partition("; then: ")[2])
+    outcome = run.invoke(app, ["init", "new folder/it's mine.toml", "--from", "bmw-b48"])
+    assert outcome.exit_code == 0
+    *_, verb, named = shlex.split(outcome.output.partition("; then: ")[2])
     assert (verb, (here / named).is_file()) == ("solve", True)
 
 
@@ -243,9 +243,9 @@ def test_a_new_folder_is_made_and_the_next_command_can_be_pasted(here: Path) -> 
 )
 def test_an_unwritable_path_is_refused_before_questions(here: Path, words: list[str], said: str) -> None:
     (here / "file").write_text("mine", encoding="utf-8")
-    found = run.invoke(app, words)
-    assert (found.exit_code, found.output.count("\n")) == (2, 1)
-    assert said in found.output
+    outcome = run.invoke(app, words)
+    assert (outcome.exit_code, outcome.output.count("\n")) == (2, 1)
+    assert said in outcome.output
     assert [path.name for path in here.iterdir()] == ["file"]
 
 
@@ -259,10 +259,10 @@ def test_a_full_disk_leaves_nothing_half_written(here: Path, monkeypatch: pytest
             raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(files, "write", full)
-    found = run.invoke(app, words)
-    assert (found.exit_code, found.output.count("\n")) == (1, 1)
-    assert re.search(r"'[^']*(schema\.json|\.toml)' cannot be written \(No space left", found.output)
-    assert found.output.endswith("; free disk space, or name another folder\n")
+    outcome = run.invoke(app, words)
+    assert (outcome.exit_code, outcome.output.count("\n")) == (1, 1)
+    assert re.search(r"'[^']*(schema\.json|\.toml)' cannot be written \(No space left", outcome.output)
+    assert outcome.output.endswith("; free disk space, or name another folder\n")
     assert list(here.iterdir()) == []
 
 
@@ -298,6 +298,6 @@ def test_engines_are_listed_and_shown() -> None:
     ],
 )
 def test_an_unknown_engine_or_problem_is_refused(here: Path, words: list[str], line: str) -> None:
-    found = run.invoke(app, words)
-    assert found.exit_code == 2
-    assert line in found.output
+    outcome = run.invoke(app, words)
+    assert outcome.exit_code == 2
+    assert line in outcome.output

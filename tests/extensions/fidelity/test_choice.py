@@ -46,8 +46,8 @@ def test_threads_of_the_machine_change_a_rounding() -> None:
         [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True, cwd=ROOT,
         env={**os.environ, **dict.fromkeys(NAMES, count)},
     ).stdout  # fmt: skip
-    found = laufruhe.solve(load(PROBLEMS / "tractor-four-lanchester.toml"))
-    here = [found.objective.value, found.certificate.lower_bound, choose(found.problem, 1e-3).error_estimate]
+    result = laufruhe.solve(load(PROBLEMS / "tractor-four-lanchester.toml"))
+    here = [result.objective.value, result.certificate.lower_bound, choose(result.problem, 1e-3).error_estimate]
     assert [float(word) for word in answer.split()] == pytest.approx(here, rel=1e-11)
 
 

@@ -49,13 +49,13 @@ def _violation(seed: int) -> tuple[float, float]:
     problem = random_elastic_problem(rng, gas=False)
     own = replace(problem, fidelity=_fidelity(rng))
     try:
-        found, best = evaluate(own), reference(own, samples=720)
+        evaluation, best = evaluate(own), reference(own, samples=720)
     except UncarriedLoadError:
         return 0.0, 1.0
-    value = objective_value(own, found)
+    value = objective_value(own, evaluation)
     truth = objective_value(problem, evaluate(finer(problem, 7001)))
     true = abs(value - truth) / value if value else 0.0
-    stated = Reference(own, best).error_of(found)
+    stated = Reference(own, best).error_of(evaluation)
     return true - stated, stated / true if true > 1e-6 else 1.0
 
 

@@ -39,11 +39,11 @@ def _errors(seed: int) -> tuple[float, float]:
     rng = random.Random(seed)
     problem = random_problem(rng)
     own = replace(problem, fidelity=_fidelity(rng))
-    found, best = evaluate(own), reference(own, samples=1440)
-    value = objective_value(own, found)
+    evaluation, best = evaluate(own), reference(own, samples=1440)
+    value = objective_value(own, evaluation)
     # many steps, no multiple of the reference's, so that both can be wrong in their own way
     truth = objective_value(problem, evaluate(finer(problem, 14401)))
-    return abs(value - truth) / value if value else 0.0, Reference(own, best).error_of(found)
+    return abs(value - truth) / value if value else 0.0, Reference(own, best).error_of(evaluation)
 
 
 @pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 1, 2))
@@ -66,11 +66,11 @@ def test_estimate_with_few_orders_of_gas_is_not_below_the_error(make, seed: int)
     fidelity = Fidelity(samples=rng.choice([96, 360, 720]), gas_orders=rng.choice([1, 2, 4, 8, 12, 24]))
     own = replace(problem, fidelity=replace(fidelity, orders=rng.choice([None, None, 16]), gas_samples=1440))
     try:
-        found, best = evaluate(own), reference(own)
+        evaluation, best = evaluate(own), reference(own)
     except UncarriedLoadError:
         return
-    value, truth = objective_value(own, found), objective_value(problem, evaluate(finer(problem, 7001)))
-    assert abs(value - truth) <= Reference(own, best).error_of(found) * max(value, 1e-300)
+    value, truth = objective_value(own, evaluation), objective_value(problem, evaluate(finer(problem, 7001)))
+    assert abs(value - truth) <= Reference(own, best).error_of(evaluation) * max(value, 1e-300)
 
 
 def test_stars_keep_the_choice() -> None:
@@ -80,9 +80,9 @@ def test_stars_keep_the_choice() -> None:
     throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
     star = problem.phasing.problem_of(Candidate(throws, (1, 2, 4, 5, 3)))
     assert star.fidelity.gas_orders == 4
-    found, best = evaluate(star), reference(star)
-    value, truth = objective_value(star, found), objective_value(star, best)
-    assert 0.0 < abs(value - truth) <= Reference(star, best).error_of(found) * value
+    evaluation, best = evaluate(star), reference(star)
+    value, truth = objective_value(star, evaluation), objective_value(star, best)
+    assert 0.0 < abs(value - truth) <= Reference(star, best).error_of(evaluation) * value
 
 
 def test_a_trade_tries_it_where_there_is_gas() -> None:

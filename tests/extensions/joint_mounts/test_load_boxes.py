@@ -58,11 +58,11 @@ def test_no_design_of_a_box_is_under_its_bound_and_small_boxes_come_near(seed: i
         bound = float(boxes.bounds(lower[None], upper[None])[0][0])
         for share in generator.random((6, len(low))):
             values = columns(problem, lower + share * (upper - lower), numbers)
-            found = evaluate(problem, problem.design(values))
-            if is_inside(problem, values) and found.violation(problem.limits) <= 0.0:
-                assert bound <= objective_value(problem, found) * (1.0 + 1e-9)
+            evaluation = evaluate(problem, problem.design(values))
+            if is_inside(problem, values) and evaluation.violation(problem.limits) <= 0.0:
+                assert bound <= objective_value(problem, evaluation) * (1.0 + 1e-9)
             if widest == 1e-4 and bound < np.inf:
-                near.append(bound / objective_value(problem, found))
+                near.append(bound / objective_value(problem, evaluation))
     assert not near or max(near) > 0.98
 
 
@@ -72,9 +72,9 @@ ONE_NUMBER = ["one-damper-over-41-speeds", "one-stiffness-under-transmissibility
 @pytest.mark.parametrize("name", first_fast(ONE_NUMBER, 0, 1))
 def test_one_open_number_is_bounded_by_few_boxes(name: str) -> None:
     path = INPUTS / f"{name}.toml"
-    problem, own = laufruhe.load(path), OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
-    ((low, high),) = own.box
-    designs = own.designs(np.linspace(low, high, 61)[:, None])
+    problem, text = laufruhe.load(path), OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    ((low, high),) = text.box
+    designs = text.designs(np.linspace(low, high, 61)[:, None])
     objective = np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf)
     minimum = float(objective.min())
     (found,) = load_bounds(problem, minimum, 1e-3 * minimum, (1.0,))
@@ -88,11 +88,11 @@ def test_one_open_number_is_bounded_by_few_boxes(name: str) -> None:
 @pytest.mark.slow
 def test_a_transmissibility_limit_takes_the_boxes_where_it_is_broken() -> None:
     path = INPUTS / "one-stiffness-under-transmissibility.toml"
-    problem, own = laufruhe.load(path), OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    problem, text = laufruhe.load(path), OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
     (limit,) = problem.limits
-    ((low, high),) = own.box
+    ((low, high),) = text.box
     x = np.linspace(low, high, 201)
-    ratio = own.designs(x[:, None]).measure({"quantity": "transmissibility", "orders": [2]})
+    ratio = text.designs(x[:, None]).measure({"quantity": "transmissibility", "orders": [2]})
     boxes = LoadBoxes(
         problem.changed(limits=(limit.__class__(limit.name, limit.measure, float(np.median(ratio))),)), 0.0
     )
@@ -108,9 +108,9 @@ def test_a_share_of_the_boxes_is_divided_first() -> None:
     path = INPUTS / "one-stiffness-under-transmissibility.toml"
     problem = laufruhe.load(path)
     problem = replace(problem, search=replace(problem.search, boxes=40))
-    own = OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
-    ((low, high),) = own.box
-    designs = own.designs(np.linspace(low, high, 61)[:, None])
+    text = OwnModel(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    ((low, high),) = text.box
+    designs = text.designs(np.linspace(low, high, 61)[:, None])
     minimum = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
     few, many = load_bounds(problem, minimum, 1e-4 * minimum, (EARLY, 1.0))
     assert few.boxes <= 10

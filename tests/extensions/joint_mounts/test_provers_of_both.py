@@ -27,16 +27,16 @@ def own_of(name: str) -> OwnModel:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["one-damper-over-41-speeds", "one-stiffness-under-transmissibility"])
 def test_one_number_is_proven(name: str) -> None:
-    found, own = laufruhe.solve(INPUTS / f"{name}.toml"), own_of(name)
+    result, own = laufruhe.solve(INPUTS / f"{name}.toml"), own_of(name)
     ((low, high),) = own.box
     designs = own.designs(np.linspace(low, high, 61)[:, None])
     minimum = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert found.certificate.kind is Proof.GLOBAL
-    assert found.certificate.gap <= 1e-3
-    assert found.certificate.lower_bound <= minimum * (1.0 + 1e-6)
-    assert found.objective.value <= minimum * (1.0 + 1e-6)
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.gap <= 1e-3
+    assert result.certificate.lower_bound <= minimum * (1.0 + 1e-6)
+    assert result.objective.value <= minimum * (1.0 + 1e-6)
 
 
 def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

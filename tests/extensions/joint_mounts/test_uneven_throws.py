@@ -50,24 +50,24 @@ def under(found: Result, bound: float, norm: str = "rms") -> int:
 
 @pytest.mark.slow
 def test_throws_beside_a_stiffness_and_a_balancer_are_proven() -> None:
-    found = laufruhe.solve(PATH)
-    assert found.certificate is not None
-    assert found.objective is not None
-    bound = found.certificate.lower_bound
-    assert found.certificate.kind is Proof.GLOBAL
-    assert found.objective.value == pytest.approx(11.82163, rel=1e-5)
-    assert bound >= (1.0 - 1e-3) * found.objective.value
-    throw, best = decided(found)
-    assert own_at(throw).designs(best[None]).objective[0] == pytest.approx(found.objective.value, rel=1e-6)
-    assert under(found, bound) == 0
-    assert under(found, 1.001 * found.objective.value) > 0
+    result = laufruhe.solve(PATH)
+    assert result.certificate is not None
+    assert result.objective is not None
+    bound = result.certificate.lower_bound
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value == pytest.approx(11.82163, rel=1e-5)
+    assert bound >= (1.0 - 1e-3) * result.objective.value
+    throw, best = decided(result)
+    assert own_at(throw).designs(best[None]).objective[0] == pytest.approx(result.objective.value, rel=1e-6)
+    assert under(result, bound) == 0
+    assert under(result, 1.001 * result.objective.value) > 0
 
 
 @pytest.mark.parametrize("norm", first_fast(["maximum", "mean", "peak to peak"], 0, 1))
 def test_means_and_peaks_have_a_bound_of_about_half_their_value(norm: str) -> None:
-    found = laufruhe.solve(table_of_norm(norm))
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert found.certificate.lower_bound >= 0.45 * found.objective.value
-    assert under(found, found.certificate.lower_bound, norm) == 0
-    assert under(found, 1.01 * found.objective.value, norm) > 0
+    result = laufruhe.solve(table_of_norm(norm))
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert result.certificate.lower_bound >= 0.45 * result.objective.value
+    assert under(result, result.certificate.lower_bound, norm) == 0
+    assert under(result, 1.01 * result.objective.value, norm) > 0

@@ -21,11 +21,11 @@ def test_exchanges_reach_what_cuts_prove(tmp_path, monkeypatch, cylinders):
     proven = solve(problem)
     assert proven.certificate.kind is Proof.GLOBAL
     monkeypatch.setattr(even_search, "MAX_LISTED", 0)
-    found = solve(problem)
-    assert "exchanges of throws" in found.certificate.method
-    assert sum(d.value for d in found.decisions if d.name.endswith("built")) <= 1
-    assert found.objective.value == pytest.approx(proven.objective.value, rel=1e-3)
-    assert 0.0 < found.certificate.lower_bound <= proven.objective.value * (1.0 + 1e-9)
+    result = solve(problem)
+    assert "exchanges of throws" in result.certificate.method
+    assert sum(d.value for d in result.decisions if d.name.endswith("built")) <= 1
+    assert result.objective.value == pytest.approx(proven.objective.value, rel=1e-3)
+    assert 0.0 < result.certificate.lower_bound <= proven.objective.value * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("name", ["mean", "limited", "shafts"])

@@ -72,10 +72,10 @@ def test_twelve_open_throws_with_weights_opposite_each() -> None:
     text = changed(changed(FOUR, "cylinders = 4", "cylinders = 12"), 'mass = { between = ["0 kg", "1 kg"] }\n', "")
     text = changed(changed(text, "angle = { between = [0, 360] }\n", ""), "opposite_throw = 1\n",
                    "balance_factor = { between = [0, 1] }\n")  # fmt: skip
-    found = laufruhe.solve(changed(text, 'rotating_mass = "0.3 kg"\n', ""))
-    assert found.objective.value < 1e-2 * found.objective.initial
-    assert found.certificate.lower_bound <= found.objective.value
-    throws = np.array([entry.value for entry in found.decisions if entry.name.startswith("throw")])
+    result = laufruhe.solve(changed(text, 'rotating_mass = "0.3 kg"\n', ""))
+    assert result.objective.value < 1e-2 * result.objective.initial
+    assert result.certificate.lower_bound <= result.objective.value
+    throws = np.array([entry.value for entry in result.decisions if entry.name.startswith("throw")])
     for order, power in itertools.product((1, 2), (0, 1)):
         along = -0.1 * np.arange(12) if power else np.ones(12)
         assert abs(np.sum(along * np.exp(1j * order * throws))) < 1e-9

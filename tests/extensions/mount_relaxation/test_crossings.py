@@ -22,10 +22,10 @@ from mounts.test_mount_stars import parts
 @pytest.mark.slow
 def test_stars_have_a_bound(tmp_path: Path) -> None:
     """Values are held to exact models where the core is tested."""
-    found = laufruhe.solve(problem_of(tmp_path, *parts()))
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert 0.0 < found.certificate.lower_bound <= found.objective.value
+    result = laufruhe.solve(problem_of(tmp_path, *parts()))
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert 0.0 < result.certificate.lower_bound <= result.objective.value
 
 
 @pytest.mark.slow

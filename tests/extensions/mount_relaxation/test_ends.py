@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from extensions.mount_relaxation.test_mode_boxes import NEAR, decoupled, designs_about
-from extensions.mount_relaxation.test_spring_bound import DAMPED, LIMITS, MEANS, asked_for
+from extensions.mount_relaxation.test_spring_bound import DAMPED, LIMITS, MEANS, stiffness_problem
 from laufruhe.extensions.mount_relaxation.cone_program import ROUGH, ConeProgram
 from laufruhe.extensions.mount_relaxation.prover import _Narrowing
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
@@ -34,7 +34,7 @@ def test_aims_are_those_of_their_own_program_and_box() -> None:
 
 @pytest.mark.slow
 def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, MEANS, LIMITS, mounts=DAMPED)
+    problem = stiffness_problem(tmp_path, MEANS, LIMITS, mounts=DAMPED)
     value, near = objective_value(problem, evaluate(problem)), [d.start for d in problem.decisions]
     boxes, anew = (SdpRelaxation(problem, value, 1e-3, near) for _ in range(2))
     at, aim = boxes.lower + 0.9 * (boxes.upper - boxes.lower), np.eye(len(boxes.lower))[0]

@@ -74,11 +74,11 @@ def test_every_mode_is_in_its_shapes(turned: bool) -> None:
 
 def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[np.ndarray, float]]:
     """Designs that keep all limits, and what they are worth."""
-    generator, given, found = np.random.default_rng(5), evaluate(problem), []
+    generator, evaluation, found = np.random.default_rng(5), evaluate(problem), []
     low, high = sides(problem)
     while len(found) < count:
         x = np.clip(near * np.exp(generator.normal(0.0, 0.25, len(near))), low, high)
-        each = with_mounts(given, problem.design(x.tolist()))
+        each = with_mounts(evaluation, problem.design(x.tolist()))
         if each.violation(problem.limits) <= 0.0:
             found.append((x, objective_value(problem, each)))
     return found

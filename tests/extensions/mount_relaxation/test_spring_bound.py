@@ -37,7 +37,7 @@ from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.files import OPEN as OPEN_STIFFNESS
 from problem_files import PROBLEMS
-from prove.test_subdivision import DAMPED, asked_for, divided_bound
+from prove.test_subdivision import DAMPED, divided_bound, stiffness_problem
 
 OPEN = '{ between = ["60 N/mm", "700 N/mm"], start = "300 N/mm" }'
 TURNED = changed(
@@ -74,22 +74,22 @@ def designs_of(
     problem: Problem, low: np.ndarray, high: np.ndarray, count: int, seed: int
 ) -> Iterator[tuple[Any, float]]:
     """Random designs of a box that keep every limit, and what they are worth."""
-    generator, given = np.random.default_rng(seed), evaluate(problem)
+    generator, evaluation = np.random.default_rng(seed), evaluate(problem)
     for share in generator.random((count, len(low))):
         x = low + share * (high - low)
-        each = with_mounts(given, problem.design(x.tolist()))
+        each = with_mounts(evaluation, problem.design(x.tolist()))
         if each.violation(problem.limits) <= 0.0:
             yield x, objective_value(problem, each)
 
 
-def asked_of(problem: Problem) -> SdpRelaxation:
+def relaxation_of(problem: Problem) -> SdpRelaxation:
     """Boxes about the design as given."""
     return SdpRelaxation(problem, objective_value(problem, evaluate(problem)), 1e-3, problem.start)
 
 
 def test_open_springs_add_up_to_what_the_matrices_change_by(tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, OBJECTIVES["rms"], mounts=TURNED)
-    boxes, model = asked_of(problem), StiffnessBoxes(problem, 1.0).model
+    problem = stiffness_problem(tmp_path, OBJECTIVES["rms"], mounts=TURNED)
+    boxes, model = relaxation_of(problem), StiffnessBoxes(problem, 1.0).model
     mounts = open_mounts(problem, model.lower, model.upper)
     half = 0.5 * (boxes.upper - boxes.lower)
     for j, follows in enumerate(mounts.decisions):
@@ -230,10 +230,10 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
     """E42, E43, E52, E53, E57: motion, forces and travel by solving anew, and no condition broken, with turned and
     moved mounts and unbalances open too; of all motions, and of both halves where mounts mirror each other."""
     monkeypatch.setattr(orders_, "OMITTED_SYMMETRY", -1.0)
-    plain = asked_for(tmp_path, OBJECTIVES["narrowed"], mounts=TURNED) if name == "stiffness" else None
+    plain = stiffness_problem(tmp_path, OBJECTIVES["narrowed"], mounts=TURNED) if name == "stiffness" else None
     (tmp_path / "four.toml").write_text(tractor(name), encoding="utf-8")
     problem = plain or load(tmp_path / "four.toml")
-    boxes, generator = asked_of(problem), np.random.default_rng(4)
+    boxes, generator = relaxation_of(problem), np.random.default_rng(4)
     about = np.array([d.real_start for d in problem.mount_decisions])
     count, halves = 0, set[int]()
     for low, high, x, u in designs_in(generator, boxes, about, 40):
@@ -332,7 +332,7 @@ def _is_allowed(mounts: OpenMounts, stiffness: np.ndarray) -> bool:
 @pytest.mark.parametrize("limits", ["", LIMITS], ids=["free", "limited"])
 @pytest.mark.parametrize("name", first_fast(OBJECTIVES, 1))
 def test_no_design_in_a_box_is_under_its_bound(name: str, limits: str, tmp_path: Path) -> None:
-    problem = asked_for(tmp_path, OBJECTIVES[name], limits, mounts=TURNED)
+    problem = stiffness_problem(tmp_path, OBJECTIVES[name], limits, mounts=TURNED)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     centre, tight = next(designs_of(problem, low, high, 100, 5))[0], 0.0
     for share in (1.0, 0.02):
@@ -407,7 +407,9 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
 @pytest.mark.parametrize("name", ["rms", pytest.param("means", marks=pytest.mark.slow)])
 def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Multipliers at random, and none at all."""
-    problem = asked_for(tmp_path, OBJECTIVES.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED)
+    problem = stiffness_problem(
+        tmp_path, OBJECTIVES.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED
+    )
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     high = low + 0.2 * (high - low)
     best, minimum = min(designs_of(problem, low, high, 200, 1), key=lambda pair: pair[1])
@@ -457,7 +459,7 @@ def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
 def test_no_force_of_a_high_order_exceeds_its_line() -> None:
     """E62: forces by solving anew, with an inclination and a place open; of both halves and of all motions."""
     problem = load(POWERTRAIN.with_name("tractor-four-elastic.toml"))
-    boxes, generator = asked_of(problem), np.random.default_rng(6)
+    boxes, generator = relaxation_of(problem), np.random.default_rng(6)
     about, tight = np.array([d.real_start for d in problem.mount_decisions]), 0.0
     omega = 2.0 * np.pi * 70.0
     for low, high, x, _ in designs_in(generator, boxes, about, 30):
@@ -489,7 +491,7 @@ def test_no_force_of_a_high_order_exceeds_its_line() -> None:
 def test_orders_that_nothing_excites_have_no_bound(norm: str, tmp_path: Path) -> None:
     """Alone they are nothing; beside others they add nothing."""
     silent = f'minimise = "{norm} mount force"\norders = [3]\noperating_points = ["idle"]'
-    problem = asked_for(tmp_path, silent)
+    problem = stiffness_problem(tmp_path, silent)
     assert spring_bound(Question(problem, 0.0, 0.0, problem.start)).bound == 0.0
     assert spring_bound(Question(problem, 1.0, 1e-4, problem.start)).bound == 0.0
 
@@ -560,7 +562,7 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
 
 @pytest.mark.slow
 def test_sums_over_samples_are_those_of_the_cycle_with_more_than_two_of_every_order(tmp_path: Path) -> None:
-    boxes = asked_of(asked_for(tmp_path, MEANS))
+    boxes = relaxation_of(stiffness_problem(tmp_path, MEANS))
     ((weight, own),) = boxes._terms
     places = {order.index for order in own.orders}
     assert len(places) == 2
@@ -577,7 +579,7 @@ PLACES = changed(MOUNTS, ('["300 mm", "200 mm", "0 mm"]', '[{ between = ["270 mm
 
 @pytest.mark.parametrize("mounts", [MOUNTS, PLACES], ids=["stiffness", "places too"])
 def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_allow(tmp_path: Path, mounts: str) -> None:
-    problem, generator = asked_for(tmp_path, OBJECTIVES["rms"], mounts=mounts), np.random.default_rng(5)
+    problem, generator = stiffness_problem(tmp_path, OBJECTIVES["rms"], mounts=mounts), np.random.default_rng(5)
     model = StiffnessBoxes(problem, 1.0).model if mounts is MOUNTS else None
     lower, upper = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     whole = open_mounts(problem, lower, upper)
@@ -649,7 +651,7 @@ def test_no_response_on_hydraulic_mounts_exceeds_its_bound() -> None:
 @pytest.mark.parametrize("share", [0.25, 0.5])
 def test_a_share_of_a_norm_is_cut_off_at_the_norm_over_the_share(share: float, tmp_path: Path) -> None:
     """Check that a root with a share of the norm is cut off at the norm over this share."""
-    boxes = asked_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + OBJECTIVES["rms"]))
+    boxes = relaxation_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + OBJECTIVES["rms"]))
     ((variable,), *_), look = boxes._variables, boxes._box(0, boxes.lower, boxes.upper)
     whole, part = (
         look.cut_off([replace(variable, share=own, loss=0.0)], boxes._roots[0]).uppers[0] for own in (1.0, share)

@@ -27,11 +27,11 @@ def test_bounds_are_wider_and_hold(name: str, tmp_path: Path) -> None:
     done = run(without(["mount_relaxation"], tmp_path / "site"), "-c", SOLVED, path)
     assert done.returncode == 0, done.stderr
     value, bound = json.loads(done.stdout)
-    found = laufruhe.solve(path)
-    assert found.objective is not None
-    assert found.certificate is not None
-    assert value == pytest.approx(found.objective.value, rel=1e-6)
-    assert bound <= found.objective.value * (1.0 + 1e-9)
+    result = laufruhe.solve(path)
+    assert result.objective is not None
+    assert result.certificate is not None
+    assert value == pytest.approx(result.objective.value, rel=1e-6)
+    assert bound <= result.objective.value * (1.0 + 1e-9)
     assert (1.0 - READY[name]) * value <= bound
-    assert found.certificate.lower_bound >= bound * (1.0 - found.problem.tolerance)
-    assert found.certificate.gap <= 0.1 * (1.0 + 1e-9)
+    assert result.certificate.lower_bound >= bound * (1.0 - result.problem.tolerance)
+    assert result.certificate.gap <= 0.1 * (1.0 + 1e-9)

@@ -24,13 +24,13 @@ def _solved(limits: list[dict[str, Any]], throws: Any = (0, 180, 180, 0), **phas
     engine = {"layout": "inline", "cycle": "four-stroke", "stroke": "100 mm", "rod_ratio": 0.25}
     engine |= {"reciprocating_mass": "1 kg", "cylinder_spacing": "110 mm"}
     engine |= {"throws": list(throws)} if throws != "open" else {"throws": "open", "cylinders": 4}
-    found = {
+    tables = {
         "title": "Four with two shafts that may be left out", "engine": engine,
         "operating_points": [{"speed": "3000 rpm"}], "objective": {"minimise": "rms shaking force"},
         "balancer_shafts": [_shaft("near", 2, "60 mm"), _shaft("far", -2, "-400 mm")], "constraints": limits,
         "phasing": phasing,
     }  # fmt: skip
-    return solve(load_tables(found, Path("rooms.toml")))
+    return solve(load_tables(tables, Path("rooms.toml")))
 
 
 def _built(result: Result) -> dict[str, float]:

@@ -28,14 +28,14 @@ def test_a_missing_extension_is_named() -> None:
 def test_a_linear_function_of_a_load_is_proven_as_the_load_is() -> None:
     problem = ready("tractor-four-lanchester")
     vertical = laufruhe.own_measure("vertical force", load=lambda forces: forces[..., 2:])
-    own = laufruhe.solve(problem.with_objective(vertical))
+    result = laufruhe.solve(problem.with_objective(vertical))
     same = laufruhe.solve(problem.minimise("mean mount force", direction_weights=[0, 0, 1]))
-    assert own.objective is not None
-    assert own.certificate is not None
+    assert result.objective is not None
+    assert result.certificate is not None
     assert same.objective is not None
-    assert own.objective.value == pytest.approx(same.objective.value, rel=1e-9)
-    assert own.certificate.kind is Proof.GLOBAL
-    limited = laufruhe.solve(problem.with_limit(vertical, 0.999 * own.certificate.lower_bound, "vertical"))
+    assert result.objective.value == pytest.approx(same.objective.value, rel=1e-9)
+    assert result.certificate.kind is Proof.GLOBAL
+    limited = laufruhe.solve(problem.with_limit(vertical, 0.999 * result.certificate.lower_bound, "vertical"))
     assert limited.conflict == ("vertical",)
 
 
@@ -57,15 +57,15 @@ def test_a_function_in_place_of_a_norm_is_only_declared_convex() -> None:
     load = problem.objective[0].measure.channel.name
     root = laufruhe.own_measure("root", lambda f: np.sqrt((f**2).sum(axis=-1).mean()), load, curvature="convex")
     # few starts suffice: the function is the norm of the problem
-    own = laufruhe.solve(problem.with_objective(root).changed(search=Search(starts=1)))
+    result = laufruhe.solve(problem.with_objective(root).changed(search=Search(starts=1)))
     same = laufruhe.solve(problem)
-    assert own.objective is not None
-    assert own.certificate is not None
+    assert result.objective is not None
+    assert result.certificate is not None
     assert same.objective is not None
-    assert own.objective.value == pytest.approx(same.objective.value, rel=1e-3)
-    assert own.certificate.kind in (Proof.LOCAL, Proof.NONE)
-    assert own.certificate.lower_bound == 0.0
-    assert "convex as declared, not proven" in own.certificate.method
+    assert result.objective.value == pytest.approx(same.objective.value, rel=1e-3)
+    assert result.certificate.kind in (Proof.LOCAL, Proof.NONE)
+    assert result.certificate.lower_bound == 0.0
+    assert "convex as declared, not proven" in result.certificate.method
 
 
 @pytest.mark.parametrize(

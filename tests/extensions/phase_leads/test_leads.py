@@ -97,8 +97,8 @@ def test_a_limit_holds_the_lead_away(tmp_path: Path) -> None:
     limit = '[[constraints]]\nlimit = "rms roll moment"\nmax = "{:.9f} N m"\n[objective]'
     measured = np.sqrt(np.mean(at_twelve.loads[0].wrench.sample(360)[:, 3] ** 2))
     held = loaded(tmp_path, changed(text, "[objective]", limit.format(measured)))
-    found = solve(held)
-    assert found.final.value(held.limits[0].measure) <= measured * (1.0 + 2e-5)
+    solution = solve(held)
+    assert solution.final.value(held.limits[0].measure) <= measured * (1.0 + 2e-5)
 
 
 def test_bounds_beyond_the_ports_are_refused(tmp_path: Path) -> None:
@@ -196,16 +196,16 @@ def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
     """No angle of a scan has weights that are better, each proven by itself; one more limit is never better."""
     coarse = changed(COUPLED, "samples = 360", "samples = 120")
     problem = replace(loaded(tmp_path, coarse), tolerance=1e-3)
-    found = solve(problem)
-    assert found.certificate is not None
-    assert found.certificate.kind is Proof.GLOBAL
-    value = objective_value(problem, found.final)
+    result = solve(problem)
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    value = objective_value(problem, result.final)
     values = {}
     for angle in (90, 165, 175, 178):
         each = solve(loaded(tmp_path, changed(coarse, "{ between = [0, 180], start = 90 }", str(angle))))
         if each.status is Status.OPTIMAL:
             values[angle] = objective_value(each.problem, each.final)
-    assert found.certificate.lower_bound <= min(values.values())
+    assert result.certificate.lower_bound <= min(values.values())
     assert value <= min(values.values()) * (1.0 + problem.tolerance)
     assert set(values) == {165, 175, 178}
     free = solve(loaded(tmp_path, COUPLED.split("[[constraints]]")[0] + "[fidelity]\nsamples = 120\n"))

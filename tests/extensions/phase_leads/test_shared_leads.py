@@ -138,20 +138,20 @@ CASES = {
 def test_no_lead_is_better_than_the_bound(name: str) -> None:
     """Check that none of nine leads is below the bound, and the design against a file with this lead."""
     own = CASES[name]
-    found = laufruhe.solve(own)
+    result = laufruhe.solve(own)
     (decision,) = own.decisions
     grid = [
         objective_value(own, evaluate(own, own.design([float(lead)])))
         for lead in np.linspace(decision.lower, decision.upper, 9)
     ]
-    assert found.certificate.lower_bound <= min(grid) * (1.0 + 1e-9)
-    assert found.objective.value <= min(grid) * (1.0 + 1e-6)
+    assert result.certificate.lower_bound <= min(grid) * (1.0 + 1e-9)
+    assert result.objective.value <= min(grid) * (1.0 + 1e-6)
     if own.search.boxes is None:
-        assert str(found.certificate.kind) == "global"
-    lead = math.degrees(found.decisions[0].value)
+        assert str(result.certificate.kind) == "global"
+    lead = math.degrees(result.decisions[0].value)
     given = problem("rms roll moment", lead, engine={"crank_ratio": int(own.engine.shafts[1].ratio)})
     again = replace(given, objective=own.objective)
-    assert objective_value(own, evaluate(again)) == pytest.approx(found.objective.value, rel=1e-9)
+    assert objective_value(own, evaluate(again)) == pytest.approx(result.objective.value, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -159,10 +159,10 @@ def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
     """The least roll moment under a limit on the force that the lead leaves; and a limit that nothing keeps."""
     force = [{"limit": "rms shaking force", "max": "300 N"}]
     own = problem("rms roll moment", between(0, 40), constraints=force)
-    found = laufruhe.solve(own)
-    assert found.limits[0].value == pytest.approx(300.0, rel=1e-3)
-    assert found.limits[0].value <= 300.0 * (1.0 + 1e-6)
-    assert str(found.certificate.kind) == "global"
+    result = laufruhe.solve(own)
+    assert result.limits[0].value == pytest.approx(300.0, rel=1e-3)
+    assert result.limits[0].value <= 300.0 * (1.0 + 1e-6)
+    assert str(result.certificate.kind) == "global"
     maximum = objective_value(own, evaluate(own, own.design([math.radians(40.0)])))
     none = [{"limit": "rms roll moment", "max": f"{0.9 * maximum} N m"}]
     assert str(laufruhe.solve(problem("rms shaking force", between(0, 40), constraints=none)).status) == "infeasible"
@@ -210,5 +210,5 @@ def test_unsupported_quantities_of_shared_chambers_are_refused(more: dict[str, A
 
 
 def test_without_boxes_the_whole_range_is_bounded_once() -> None:
-    found = laufruhe.solve(problem("rms roll moment", between(5, 40), search={"boxes": 0, "starts": 1}))
-    assert found.certificate.method.endswith("lower bound on 1 box of leads")
+    result = laufruhe.solve(problem("rms roll moment", between(5, 40), search={"boxes": 0, "starts": 1}))
+    assert result.certificate.method.endswith("lower bound on 1 box of leads")

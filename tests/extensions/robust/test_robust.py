@@ -116,18 +116,18 @@ def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result
 def test_no_other_design_is_better(read: Callable[[str], Problem]) -> None:
     """A search by the exact model over every corner of the intervals, without cones or bounds."""
     problem = read(TEXT + ROBUST)
-    found = solve(problem)
+    result = solve(problem)
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))
 
     def largest(x: np.ndarray) -> float:
         built = BuiltEngines(problem, turned(x), problem.fidelity.samples)
         return float(objective_values(built.terms, corners).max())
 
-    start = [d.value for d in found.decisions]
-    assert largest(np.array(start)) == pytest.approx(worst(found), rel=1.1e-4)
+    start = [d.value for d in result.decisions]
+    assert largest(np.array(start)) == pytest.approx(worst(result), rel=1.1e-4)
     searched = minimize(largest, [0.9 * v for v in start], method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-4})
-    assert searched.fun >= worst(found) * (1.0 - 1.1e-4)
-    assert searched.fun == pytest.approx(worst(found), rel=1e-3)
+    assert searched.fun >= worst(result) * (1.0 - 1.1e-4)
+    assert searched.fun == pytest.approx(worst(result), rel=1e-3)
 
 
 def test_no_tolerance_is_the_drawing(read: Callable[[str], Problem], problem: Problem) -> None:
@@ -241,16 +241,16 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
 def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None:
     limit = '[[constraints]]\nlimit = "maximum shaking force"\nmax = "{}"\noperating_points = ["2500 rpm"]\n'
     tight = read((TEXT + ROBUST + limit.format("1900 N")).replace('operating_points = ["2500 rpm"]\n', ""))
-    found = solve(tight)
-    assert found.limits[0].value <= 1900.0 * (1.0 + 1e-5)
+    result = solve(tight)
+    assert result.limits[0].value <= 1900.0 * (1.0 + 1e-5)
     wide, narrow = (
         worst(solve(replace(tight, limits=(replace(tight.limits[0], maximum=maximum),))))
         for maximum in (1930.0, 1870.0)
     )
-    assert found.limits[0].shadow_price == pytest.approx((narrow - wide) / 60.0, rel=0.05, abs=1e-6)
+    assert result.limits[0].shadow_price == pytest.approx((narrow - wide) / 60.0, rel=0.05, abs=1e-6)
     for z in itertools.product((-1.0, 1.0), repeat=6):
         own = with_errors(tight, np.array(z))
-        design = own.design(turned([d.value for d in found.decisions]))
+        design = own.design(turned([d.value for d in result.decisions]))
         assert evaluate(own, design).value(tight.limits[0].measure) <= 1900.0 * (1.0 + 1e-5)
     none = solve(read((TEXT + ROBUST + limit.format("200 N")).replace('operating_points = ["2500 rpm"]\n', "")))
     assert "no design exists" in none.message
@@ -330,39 +330,39 @@ def minimise(quantity: str, samples: int = 48) -> str:
 def test_crossed(read: Callable[[str], Problem], text: str) -> None:
     """Proven, and no engine of a few hundred exceeds it."""
     problem = read(text + ROBUST)
-    found = solve(replace(problem, tolerance=1e-3))
-    assert found.certificate is not None
-    assert found.certificate.kind is Proof.GLOBAL
-    values = unbalance_values(problem, found)
+    result = solve(replace(problem, tolerance=1e-3))
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    values = unbalance_values(problem, result)
     for z in tolerances_of(problem).draw(np.random.default_rng(4), 200):
         own = with_errors(problem, z)
-        value = objective_value(own, evaluate(own, own.design(values), found.final.samples))
-        assert value <= worst(found) * (1.0 + 1e-9)
+        value = objective_value(own, evaluate(own, own.design(values), result.final.samples))
+        assert value <= worst(result) * (1.0 + 1e-9)
 
 
 def test_nonlinear_tolerances_are_drawn_at_random(read: Callable[[str], Problem]) -> None:
     """Rod ratio and spacing: the worst of the engines drawn, said to be just that."""
     text = TEXT.replace("rod_ratio = 0.26", 'rod_ratio = "0.26 ± 5 %"').replace('"125 mm"', '"125 mm ± 1 mm"')
     problem = read(text + ROBUST + "engines = 30\n")
-    found = solve(problem)
-    assert found.objective is not None
-    assert isinstance(found.details, RobustResult)
-    assert found.certificate is not None
-    assert "worst of 30 drawn engines" in found.objective.name
-    assert "not of all" in found.certificate.method
-    assert not found.details.exact
-    values = unbalance_values(problem, found)
+    result = solve(problem)
+    assert result.objective is not None
+    assert isinstance(result.details, RobustResult)
+    assert result.certificate is not None
+    assert "worst of 30 drawn engines" in result.objective.name
+    assert "not of all" in result.certificate.method
+    assert not result.details.exact
+    values = unbalance_values(problem, result)
     engines = (with_errors(problem, z) for z in tolerances_of(problem).draw(np.random.default_rng(1), 30))
-    maximum = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in engines)
-    assert maximum == pytest.approx(worst(found), rel=1e-9)
+    maximum = max(objective_value(own, evaluate(own, own.design(values), result.final.samples)) for own in engines)
+    assert maximum == pytest.approx(worst(result), rel=1e-9)
 
 
 @pytest.mark.slow
 def test_ready_problem() -> None:
     """Proven to a thousandth."""
     problem = load(PROBLEMS / "tractor-four-robust.toml")
-    found = solve(replace(problem, tolerance=1e-3, fidelity=replace(problem.fidelity, samples=72)))
-    assert worst(found) == pytest.approx(462.02, rel=1e-3)
-    assert isinstance(found.details, RobustResult)
-    assert found.details.nominal.worst == pytest.approx(469.99, rel=1e-3)
-    assert found.details.exceeding == 0
+    result = solve(replace(problem, tolerance=1e-3, fidelity=replace(problem.fidelity, samples=72)))
+    assert worst(result) == pytest.approx(462.02, rel=1e-3)
+    assert isinstance(result.details, RobustResult)
+    assert result.details.nominal.worst == pytest.approx(469.99, rel=1e-3)
+    assert result.details.exceeding == 0

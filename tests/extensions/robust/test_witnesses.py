@@ -70,11 +70,11 @@ def test_a_broken_bounder_of_assemblies(monkeypatch: pytest.MonkeyPatch) -> None
 def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a search says of what is enough, its bound is that of all parts: the gap grows, and no more."""
     monkeypatch.setattr(assembly_solver._Search, "cutoff", property(lambda _: -math.inf))
-    found = laufruhe.solve(PROBLEMS / "selective-assembly.toml")
-    assert found.certificate is not None
-    assert found.certificate.kind is Proof.WITHIN_GAP
-    assert found.objective is not None
-    assert found.certificate.lower_bound < found.objective.value
+    result = laufruhe.solve(PROBLEMS / "selective-assembly.toml")
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.WITHIN_GAP
+    assert result.objective is not None
+    assert result.certificate.lower_bound < result.objective.value
 
 
 @pytest.fixture
@@ -94,18 +94,22 @@ def test_an_assembly_that_was_pruned_is_found_out(request: pytest.FixtureRequest
     # other tests share this result, so it is found before the search is broken
     best = solved("selective-assembly")
     request.getfixturevalue("pruned_assemblies")
-    found = solve(laufruhe.load(PROBLEMS / "selective-assembly.toml"))
+    result = solve(laufruhe.load(PROBLEMS / "selective-assembly.toml"))
     assert best.objective is not None
-    assert found.certificate is not None
-    assert (found.status, found.certificate.kind, found.certificate.lower_bound) == (Status.FEASIBLE, Proof.NONE, 0.0)
-    assert "report" in found.message
-    assert isinstance(found.details, AssemblyResult)
+    assert result.certificate is not None
+    assert (result.status, result.certificate.kind, result.certificate.lower_bound) == (
+        Status.FEASIBLE,
+        Proof.NONE,
+        0.0,
+    )
+    assert "report" in result.message
+    assert isinstance(result.details, AssemblyResult)
     # the places told are those of the design
-    chosen = tuple(zip(*([p - 1 for p in place.parts] for place in found.details.places), strict=True))
-    own = found.problem.extra(Assembly)
+    chosen = tuple(zip(*([p - 1 for p in place.parts] for place in result.details.places), strict=True))
+    own = result.problem.extra(Assembly)
     assert own is not None
-    engine = assemble(found.problem.engine, own.lots, chosen)
-    value = objective_value(found.problem, evaluate(found.problem, engine))
-    assert found.objective is not None
-    assert found.objective.value >= best.objective.value * (1.0 - 1e-4)
-    assert value == pytest.approx(found.objective.value, rel=1e-12)
+    engine = assemble(result.problem.engine, own.lots, chosen)
+    value = objective_value(result.problem, evaluate(result.problem, engine))
+    assert result.objective is not None
+    assert result.objective.value >= best.objective.value * (1.0 - 1e-4)
+    assert value == pytest.approx(result.objective.value, rel=1e-12)

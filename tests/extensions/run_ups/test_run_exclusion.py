@@ -21,10 +21,10 @@ from laufruhe.solvers.mounts.nonlinear import are_contradictory, minimal_conflic
 def limits_of(problem: Problem, share: float, seed: int = 0) -> list[dict[str, Any]]:
     """Force and travel of a run as the best of 30 random designs has them together, times a share."""
     r = np.random.default_rng(seed)
-    given = evaluate(problem)
+    evaluation = evaluate(problem)
     low, high = sides(problem)
     found = np.array([
-        [with_mounts(given, problem.design(x.tolist())).value(measure) for measure in OF_RUNS[:2]]
+        [with_mounts(evaluation, problem.design(x.tolist())).value(measure) for measure in OF_RUNS[:2]]
         for x in low + (high - low) * r.random((30, len(low)))
     ])  # fmt: skip
     middle = np.median(found, axis=0)
@@ -54,10 +54,10 @@ def test_no_search_meets_excluded_limits(seed: int) -> None:
     problem = limited(seed, 0.7)
     assert are_contradictory(problem, problem.limits)
     low, high = sides(problem)
-    given = evaluate(problem)
+    evaluation = evaluate(problem)
 
     def violation(x: Array) -> float:
-        return with_mounts(given, problem.design(np.clip(x, low, high).tolist())).violation(problem.limits)
+        return with_mounts(evaluation, problem.design(np.clip(x, low, high).tolist())).violation(problem.limits)
 
     r = np.random.default_rng(seed)
     start = min(low + (high - low) * r.random((20, len(low))), key=violation)

@@ -47,15 +47,15 @@ def limited(*limits: tuple[str, str], **more: Any) -> Problem:
 
 def mounts(stop: dict[str, str] | None = None, **opened: Any) -> dict[str, Any]:
     """The mounts of the ready problem, all stiffness given, with something else."""
-    found = tables_of(READY)["mounts"]
+    tables = tables_of(READY)["mounts"]
     places = []
-    for place in found["places"]:
+    for place in tables["places"]:
         own = dict(place)
         if "stiffness" in own:
             own["stiffness"] = ["120 N/mm", "120 N/mm", "150 N/mm"]
             own |= opened | ({"stop": stop} if stop else {})
         places.append(own)
-    return {**found, "places": places}
+    return {**tables, "places": places}
 
 
 @pytest.fixture(scope="module")

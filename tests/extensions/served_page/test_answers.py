@@ -153,8 +153,8 @@ def test_a_malformed_page_state_is_refused(given: object) -> None:
 
 
 def test_a_page_state_is_read() -> None:
-    given = {"edits": [["set", "a", "1 kg"]], "held": [["star", "star", {"throws": [0, 180]}]], "design": {"b": 2}}
-    state = PageState.from_json(given)
+    tables = {"edits": [["set", "a", "1 kg"]], "held": [["star", "star", {"throws": [0, 180]}]], "design": {"b": 2}}
+    state = PageState.from_json(tables)
     assert state.edits == (Edit("set", "a", "1 kg"),)
     assert state.fixed[0].value == {"throws": [0, 180]}
     assert state.design == {"b": 2.0}
@@ -201,12 +201,12 @@ def test_the_state_is_saved_as_a_problem_that_evaluates_alike(tight: dict[str, A
     record = json.loads(answers.save(source(LANCHESTER), state))
     path = tmp_path / record["file"]
     path.write_text(record["toml"], encoding="utf-8")
-    found = laufruhe.evaluate(path)
-    assert found.objective is not None
+    result = laufruhe.evaluate(path)
+    assert result.objective is not None
     # at fewer angles than it was proven at
-    assert found.objective.value == pytest.approx(tight["claim"]["value"], rel=1e-5)
-    assert found.problem.limits[0].maximum == pytest.approx(0.5)
-    assert len(found.problem.decisions) == len(load(LANCHESTER).decisions)
+    assert result.objective.value == pytest.approx(tight["claim"]["value"], rel=1e-5)
+    assert result.problem.limits[0].maximum == pytest.approx(0.5)
+    assert len(result.problem.decisions) == len(load(LANCHESTER).decisions)
 
 
 def test_a_front_comes_as_a_whole_first_and_no_point_is_dominated() -> None:

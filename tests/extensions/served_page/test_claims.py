@@ -47,8 +47,8 @@ def is_modest(claim: dict[str, Any]) -> bool:
 
 def exact(path: Path, design: dict[str, float], *edits: Edit) -> float:
     """Objective of a design by the exact model."""
-    found = json.loads(answers.measure(Source(tables_of(path), path), PageState(edits, design=design)))
-    return float(found["objective"])
+    data = json.loads(answers.measure(Source(tables_of(path), path), PageState(edits, design=design)))
+    return float(data["objective"])
 
 
 @pytest.mark.parametrize(
@@ -151,8 +151,8 @@ def test_limits_on_numbers_that_wait_are_named_and_measured() -> None:
 def test_a_claim_carries_the_position_of_the_settings_that_it_is_about() -> None:
     path = PROBLEMS / "tractor-four-lanchester.toml"
     assert follow(path, position=41)["claim"]["position"] == 41
-    found = json.loads(answers.settle(Source(tables_of(path), path), PageState(position=42), 600.0))
-    assert found["claim"]["position"] == 42
+    data = json.loads(answers.settle(Source(tables_of(path), path), PageState(position=42), 600.0))
+    assert data["claim"]["position"] == 42
 
 
 def test_a_claim_names_held_decisions() -> None:
@@ -206,16 +206,16 @@ def test_no_ready_problem_claims_more_than_an_estimate_while_it_is_followed(shar
         tables = tables_of(path)
         if "study" in tables:
             continue
-        found = json.loads(answers.follow(Source(tables, path), PageState(has="later")))
-        claim = found["claim"]
+        data = json.loads(answers.follow(Source(tables, path), PageState(has="later")))
+        claim = data["claim"]
         assert not claim["is_last"], path.stem
         if claim["kind"] != "no design":
             assert is_modest(claim), path.stem
-        if found["design"] is not None:
+        if data["design"] is not None:
             problem = load(path)
             moved = not problem.phasing and all(decision.is_affine for decision in problem.decisions)
             if moved and problem.objective and not problem.ranks:
-                assert claim["value"] == pytest.approx(exact(path, found["design"]), rel=1e-9), path.stem
+                assert claim["value"] == pytest.approx(exact(path, data["design"]), rel=1e-9), path.stem
 
 
 def test_the_exact_model_is_evaluated_once(monkeypatch: pytest.MonkeyPatch) -> None:

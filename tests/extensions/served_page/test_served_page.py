@@ -241,9 +241,9 @@ def test_the_state_is_saved(shown: Page, tmp_path: Path) -> None:
         shown.locator("#save").click()
     path = tmp_path / download.value.suggested_filename
     download.value.save_as(path)
-    found = laufruhe.evaluate(path).objective
-    assert found is not None
-    assert found.value == pytest.approx(tight, rel=1e-4)
+    result = laufruhe.evaluate(path).objective
+    assert result is not None
+    assert result.value == pytest.approx(tight, rel=1e-4)
 
 
 def test_the_page_has_no_serious_finding(shown: Page) -> None:

@@ -201,10 +201,10 @@ def test_the_best_star_is_the_best_of_all_stars_each_with_its_sizes() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     values = []
     for throws in ([0, 180, 180, 0], [0, 180, 0, 180], [0, 0, 180, 180]):
-        given = changed(changed(STARS, 'throws = "open"', f"throws = {throws}"), "cylinders = 4\n", "")
-        own = laufruhe.solve(changed(given, 'firing_order = "open"\n', ""))
-        assert own.certificate.kind is Proof.GLOBAL
-        values.append(own.objective.value)
+        text = changed(changed(STARS, 'throws = "open"', f"throws = {throws}"), "cylinders = 4\n", "")
+        solution = laufruhe.solve(changed(text, 'firing_order = "open"\n', ""))
+        assert solution.certificate.kind is Proof.GLOBAL
+        values.append(solution.objective.value)
     assert result.objective.value == pytest.approx(min(values), rel=2e-4, abs=1e-6)
     assert max(values) > 1.1 * min(values) > 0.0
     assert "of 3 stars" in result.certificate.method

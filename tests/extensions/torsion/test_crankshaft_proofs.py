@@ -41,13 +41,13 @@ def test_boxes_whose_absorber_gives_off_too_much_hold_no_design(heated: Problem)
 
 @pytest.mark.slow
 def test_one_absorber_under_a_limit_of_heat_is_proven(heated: Problem) -> None:
-    found, (decision,) = laufruhe.solve(heated), heated.decisions
+    result, (decision,) = laufruhe.solve(heated), heated.decisions
     designs = [evaluate(heated, heated.design([float(x)])) for x in np.linspace(decision.lower, decision.upper, 100)]
     minimum = min(objective_value(heated, each) for each in designs if each.violation(heated.limits) <= 0.0)
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert found.certificate.kind is Proof.GLOBAL
-    assert found.certificate.lower_bound <= found.objective.value <= minimum * (1.0 + 1e-6)
+    assert result.certificate is not None
+    assert result.objective is not None
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.lower_bound <= result.objective.value <= minimum * (1.0 + 1e-6)
 
 
 @pytest.mark.slow

@@ -164,9 +164,9 @@ def test_firing_orders_of_one_star_differ() -> None:
         for star in result.phasing.ranking:
             if star.firing_orders[0].order == order:
                 assert value == pytest.approx(star.value, rel=1e-9)
-    given = {**six, "engine": {**six["engine"], "throws": [0, 120, 240, 240, 120, 0]}}
-    del given["engine"]["cylinders"]
-    one_star = laufruhe.solve(problem_of(given))
+    settings = {**six, "engine": {**six["engine"], "throws": [0, 120, 240, 240, 120, 0]}}
+    del settings["engine"]["cylinders"]
+    one_star = laufruhe.solve(problem_of(settings))
     assert one_star.status is Status.OPTIMAL
     # a star given is less freedom
     assert one_star.objective.value >= result.objective.value * (1.0 - 1e-9)

@@ -89,13 +89,13 @@ def test_quantities_of_torsion_name_missing_keys() -> None:
         ({"minimise": "absorber heat"}, None, "can be limited but not minimised"),
         ({"minimise": "rms shaft stress"}, "none", "needs the diameter of a shaft"),
     ):
-        own = {**tables, "objective": objective}
+        settings = {**tables, "objective": objective}
         if crank:
             stiff = {"stiffness": "1e5 N m/rad"}
             discs = [{**disc, "shaft": stiff} for disc in tables["torsion"]["discs"]]
-            own["torsion"] = {**tables["torsion"], "crank": stiff, "discs": discs}
+            settings["torsion"] = {**tables["torsion"], "crank": stiff, "discs": discs}
         with pytest.raises(InputError, match=said):
-            load_tables(own, Path("five.toml"))
+            load_tables(settings, Path("five.toml"))
     del tables["torsion"]
     with pytest.raises(InputError, match=r"needs the diameter of a shaft; give one in \[torsion\]"):
         load_tables(tables, Path("five.toml"))

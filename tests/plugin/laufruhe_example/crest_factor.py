@@ -41,8 +41,8 @@ class CrestFactorPart(Part):
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return one number for each case."""
         values = [record["value"] for record in records]
-        found = {"crest_factor": variable("case", values, "crest factor", "1")}
-        return xr.Dataset(found, {"case": [point.case.name for point in points]}, self.about())
+        tables = {"crest_factor": variable("case", values, "crest factor", "1")}
+        return xr.Dataset(tables, {"case": [point.case.name for point in points]}, self.about())
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
