@@ -45,8 +45,8 @@ def differentiated(path: Complex, turns: int = 1, times: int = 2) -> Complex:
 def finer(values: Complex, times: int = 32) -> Complex:
     """The same signal at so many times as many angles."""
     half = STEPS // 2
-    found = np.fft.fft(values)
-    padded = np.concatenate([found[:half], np.zeros((times - 1) * STEPS, complex), found[half:]])
+    result = np.fft.fft(values)
+    padded = np.concatenate([result[:half], np.zeros((times - 1) * STEPS, complex), result[half:]])
     return np.fft.ifft(padded) * times
 
 

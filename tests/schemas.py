@@ -234,13 +234,13 @@ def _with_catalogue_key(schema: dict[str, Any]) -> None:
 
 def study_schema() -> str:
     """The schema of study files, for editors: what a part leaves out may stand in [study.common]."""
-    found = _schema(StudyFile, without_open)
-    holder = found["definitions"]["StudyTable"]["properties"]["parts"]
+    result = _schema(StudyFile, without_open)
+    holder = result["definitions"]["StudyTable"]["properties"]["parts"]
     kinds = {kind: ref.rsplit("/", 1)[1] for kind, ref in holder["items"]["discriminator"]["mapping"].items()}
     keys: dict[str, Any] = {}
     for name in kinds.values():
-        found["definitions"][name].pop("required", None)
-        properties = found["definitions"][name]["properties"]
+        result["definitions"][name].pop("required", None)
+        properties = result["definitions"][name]["properties"]
         keys |= {key: {word: one[word] for word in HOVER} for key, one in properties.items()}
     # a condition for each kind: an editor then marks the key that is wrong, and not the whole part
     holder["items"] = {
@@ -254,7 +254,7 @@ def study_schema() -> str:
             for kind, name in kinds.items()
         ],
     }
-    return _text(found)
+    return _text(result)
 
 
 if __name__ == "__main__":

@@ -25,13 +25,13 @@ def test_numbers_are_those_of_the_exact_model(page: Page, tmp_path, name):
     page.goto(page_of(problem, tmp_path).as_uri())
     for values in designs(model, 4):
         shown = {each["name"]: each["value"] for each in page.evaluate(MEASURES, values)}
-        found = evaluated(problem, model, values)
+        result = evaluated(problem, model, values)
         if problem.objective:
-            assert shown["objective"] == pytest.approx(objective_value(problem, found), rel=1e-11)
+            assert shown["objective"] == pytest.approx(objective_value(problem, result), rel=1e-11)
         exact_limits = {name for name, _ in model.without_slider}
         for limit in problem.limits:
             if limit.name not in exact_limits:
-                value = found.check_limit(limit).value
+                value = result.check_limit(limit).value
                 assert shown[limit.name] == pytest.approx(value, rel=1e-11, abs=1e-12)
     assert page.evaluate("laufruheLive.page.then(page => page.checked)") < 1e-11
 
@@ -93,10 +93,10 @@ def test_a_norm_that_the_page_does_not_know_leaves_the_rest_at_work(still: Page,
     still.locator("[data-decision]").first.wait_for()
     for values in designs(model, 3):
         shown = {each["name"]: each["value"] for each in still.evaluate(MEASURES, values)}
-        found = evaluated(problem, model, values)
+        result = evaluated(problem, model, values)
         assert shown["objective"] is None
         for limit in problem.limits[1:]:
-            assert shown[limit.name] == pytest.approx(found.check_limit(limit).value, rel=1e-11, abs=1e-12)
+            assert shown[limit.name] == pytest.approx(result.check_limit(limit).value, rel=1e-11, abs=1e-12)
     expect(still.locator("[data-role=regret]")).to_contain_text("The objective cannot be followed live.")
     row = still.locator('tr[data-measure="worst twentieth mount force"]')
     expect(row).to_contain_text("cannot be followed live")

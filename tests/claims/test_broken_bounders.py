@@ -95,8 +95,8 @@ def test_a_broken_bounder_by_expansions(monkeypatch: pytest.MonkeyPatch) -> None
     problem = replace(problem, search=replace(problem.search, boxes=None))
     design = evaluate_design(problem, [250e3])
     known = witness_of(design, mount_numbers(design))
-    found = divided_bound(problem, design.value, 1e-4 * design.value, known)
-    assert 0.999 * design.value <= found.bound <= design.value * (1.0 + 1e-9)
+    result = divided_bound(problem, design.value, 1e-4 * design.value, known)
+    assert 0.999 * design.value <= result.bound <= design.value * (1.0 + 1e-9)
     scaled(StiffnessBoxes, "bounds", first_times(1.001))(monkeypatch)
     with pytest.raises(BoundError, match="boxes of stiffness"):
         divided_bound(problem, design.value, 1e-4 * design.value, known)

@@ -214,9 +214,9 @@ def _agrees(price: Price, here: float, moved: list[dict[str, Any]], step: float,
 def test_multipliers_of_edges_that_hang_together() -> None:
     """|x| + |y| least, x + y at least 1, x no more than 1: at (1, 0) either holds it, and they share a price."""
     objective = [Slopes(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]))]
-    found = prices_of(objective, [Slopes.smooth(np.array([-1.0, -1.0]))], np.array([[1.0, 0.0]]))
-    assert found is not None
-    (limit, edge) = found
+    result = prices_of(objective, [Slopes.smooth(np.array([-1.0, -1.0]))], np.array([[1.0, 0.0]]))
+    assert result is not None
+    (limit, edge) = result
     assert (limit.relaxed, limit.tightened) == pytest.approx((1.0, 1.0), abs=1e-5)
     assert edge.tightened == pytest.approx(0.0, abs=1e-5)
     # a peak of two rows: any mixture balances, so each edge may carry all or nothing
@@ -229,18 +229,18 @@ def test_multipliers_of_edges_that_hang_together() -> None:
 def test_two_limits_that_say_the_same_share_their_price() -> None:
     """x at most 1, twice, and 2 x wanted: to relax one of them gains nothing, to tighten one costs all."""
     limit = Slopes.smooth(np.array([1.0, 0.0]))
-    found = prices_of([Slopes.smooth(np.array([-2.0, 0.0]))], [limit, limit], np.zeros((0, 2)))
-    assert found is not None
-    for price in found:
+    result = prices_of([Slopes.smooth(np.array([-2.0, 0.0]))], [limit, limit], np.zeros((0, 2)))
+    assert result is not None
+    for price in result:
         assert (price.relaxed, price.tightened) == pytest.approx((0.0, 2.0), abs=1e-4)
 
 
 def test_a_limit_at_its_kink_beside_a_bound() -> None:
     """x + y wanted, max(x, y) and x at most 1: relaxed by e the limit gains e of y, tightened it costs both."""
     kinked = Slopes(np.array([[1.0, 0.0], [0.0, 1.0]]), np.zeros((0, 2)))
-    found = prices_of([Slopes.smooth(np.array([-1.0, -1.0]))], [kinked], np.array([[1.0, 0.0]]))
-    assert found is not None
-    limit, bound = found
+    result = prices_of([Slopes.smooth(np.array([-1.0, -1.0]))], [kinked], np.array([[1.0, 0.0]]))
+    assert result is not None
+    limit, bound = result
     assert (limit.relaxed, limit.tightened) == pytest.approx((1.0, 2.0), abs=1e-4)
     assert (bound.relaxed, bound.tightened) == pytest.approx((0.0, 1.0), abs=1e-4)
     assert not limit.is_equal

@@ -95,10 +95,10 @@ def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
     result = solved(name)
     assert result.objective is not None
     lie = marked_optimal(result)
-    found = walk.check_by_walk(result.problem, lie, 1.0)
-    assert is_withheld(found, result.objective.value)
-    assert found.objective is not None
-    assert found.objective.value < 0.9999 * result.objective.initial
+    actual = walk.check_by_walk(result.problem, lie, 1.0)
+    assert is_withheld(actual, result.objective.value)
+    assert actual.objective is not None
+    assert actual.objective.value < 0.9999 * result.objective.initial
     assert walk.check_by_walk(result.problem, result, 1.0) is result
 
 
@@ -111,10 +111,10 @@ def test_a_design_that_is_said_not_to_exist_is_found(name: str) -> None:
         result, status=Status.INFEASIBLE, objective=None, certificate=None, decisions=(), final=result.initial,
         conflict=tuple(limit.name for limit in result.problem.limits), message="no design exists",
     )  # fmt: skip
-    found = walk.check_by_walk(result.problem, lie, 10.0)
+    actual = walk.check_by_walk(result.problem, lie, 10.0)
     assert result.objective is not None
-    assert is_withheld(found, result.objective.value)
-    assert found.conflict == ()
+    assert is_withheld(actual, result.objective.value)
+    assert actual.conflict == ()
 
 
 @pytest.mark.parametrize("rank", [1, 2])
@@ -128,12 +128,12 @@ def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
     assert star.objective is not None
     claim = Certificate(Proof.GLOBAL, star.objective.value, 0.0, 0.0, "a false bound")
     lie = with_star(result.problem, phasing, star, candidate, claim, replace(ranked, ranking=ranked.ranking[rank:]))
-    found = walk.check_by_walk(result.problem, lie, 1.0)
+    actual = walk.check_by_walk(result.problem, lie, 1.0)
     assert result.objective is not None
-    assert is_withheld(found, result.objective.value)
-    assert found.phasing is not None
-    assert found.phasing.ranking[0].value == pytest.approx(result.objective.value, rel=1e-9)
-    assert not any(star.proven for star in found.phasing.ranking)
+    assert is_withheld(actual, result.objective.value)
+    assert actual.phasing is not None
+    assert actual.phasing.ranking[0].value == pytest.approx(result.objective.value, rel=1e-9)
+    assert not any(star.proven for star in actual.phasing.ranking)
 
 
 def test_throws_are_walked_from_the_best_star_only() -> None:

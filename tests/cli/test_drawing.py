@@ -18,10 +18,10 @@ pytestmark = pytest.mark.slow
 def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
     monkeypatch.setattr(drawing, "processors", lambda: count + 1)
     with drawing.artist(("png",)) as ask:
-        found = drawing.drawing(ask, result, folder, ("png",))()
-    files = {f"{name}.png": (folder / f"{name}.png").read_bytes() for name in found}
+        actual = drawing.drawing(ask, result, folder, ("png",))()
+    files = {f"{name}.png": (folder / f"{name}.png").read_bytes() for name in actual}
     assert {path.name for path in folder.iterdir()} == set(files)
-    return files | {name: svg.encode() for name, svg in found.items()}
+    return files | {name: svg.encode() for name, svg in actual.items()}
 
 
 def test_by_whom_a_picture_is_drawn_cannot_be_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -80,10 +80,10 @@ def shell(words: str, here: Path) -> subprocess.CompletedProcess[str]:
 )
 def test_closed_streams(words: str, status: int, said: str, here: Path) -> None:
     shutil.copy(SINGLE, here / "p.toml")
-    found = shell(words, here)
-    assert (found.returncode, found.stderr[: len(said)]) == (status, said)
-    assert "Traceback" not in found.stderr
-    assert said or not found.stderr
+    result = shell(words, here)
+    assert (result.returncode, result.stderr[: len(said)]) == (status, said)
+    assert "Traceback" not in result.stderr
+    assert said or not result.stderr
 
 
 @pytest.mark.slow

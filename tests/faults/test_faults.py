@@ -55,11 +55,11 @@ DAMAGED = [("check", 526, 60), ("evaluate", 3000, 15), ("explain", 4100, 15), ("
 
 @pytest.mark.parametrize(("verb", "first", "count"), first_fast(DAMAGED, 0, 3))
 def test_damaged_files(verb: str, first: int, count: int, tmp_path: Path) -> None:
-    found = harness.run(range(first, first + count), verb, tmp_path, jobs=2)
-    assert [one for one in found if one.wrong] == []
-    assert [one.seed for one in found] == list(range(first, first + count))
+    result = harness.run(range(first, first + count), verb, tmp_path, jobs=2)
+    assert [one for one in result if one.wrong] == []
+    assert [one.seed for one in result] == list(range(first, first + count))
     # damage that is always found, or never, tests nothing
-    statuses = Counter((one.kind, one.status) for one in found)
+    statuses = Counter((one.kind, one.status) for one in result)
     for kind in ("problem", "study", "trace") if verb == "check" else ("problem",):
         whole = sum(n for (of, _), n in statuses.items() if of == kind)
         assert 0.01 * whole < statuses[kind, 0] < 0.7 * whole

@@ -18,9 +18,9 @@ from rigid_digits import rigid_part
 @pytest.mark.parametrize("seed", range(24))
 def test_double_precision_on_random_engines(seed: int) -> None:
     """Offsets, rods with inertia, rotating masses, vees, shafts either way, gas, one or two points, every norm."""
-    found = rigid_part(random_problem(random.Random(40 + seed)))
-    assert found.covered
-    assert found.error <= 2e-14
+    result = rigid_part(random_problem(random.Random(40 + seed)))
+    assert result.covered
+    assert result.error <= 2e-14
 
 
 @pytest.mark.parametrize("name", ["tractor-four-lanchester", "vee-eight-cross", "powertrain-torque-roll"])

@@ -97,12 +97,12 @@ def test_time_agrees_with_the_frequency_domain_of_the_same_law() -> None:
     point = problem.points[0]
     wrench = evaluate(replace(problem, fidelity=fidelity)).loads[0].wrench
     mounting = mounting_in(problem.engine)
-    found = TimeMounting(mounting, 180).forces(wrench, point.speed).sample(180)
+    result = TimeMounting(mounting, 180).forces(wrench, point.speed).sample(180)
     same = viscous_forces(mounting, wrench, point.speed).sample(180)
-    assert np.abs(found - same).max() <= 1e-6 * np.abs(same).max()
+    assert np.abs(result - same).max() <= 1e-6 * np.abs(same).max()
     # and the law itself matters here, so the test above can tell
     other = mounting.forces(wrench, point.speed).sample(180)
-    assert np.abs(found - other).max() > 1e-3 * np.abs(same).max()
+    assert np.abs(result - other).max() > 1e-3 * np.abs(same).max()
 
 
 def test_without_hysteresis_the_two_laws_are_one() -> None:

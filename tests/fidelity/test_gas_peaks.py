@@ -180,11 +180,11 @@ def test_error_with_gas_is_not_below_the_true_one(seed: int) -> None:
 def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
     """On either side of a dead centre it is another: a peak stands there, and orders alone overshoot it."""
     rng = random.Random(seed)
-    found = problem_of_peak(seed)
-    point = replace(found.points[0], gas=_gas(rng))
+    result = problem_of_peak(seed)
+    point = replace(result.points[0], gas=_gas(rng))
     problem = replace(
-        found, points=(point,), objective=(Term(Measure(channels.CRANK_PIN_FORCE, NORMS["maximum"])),),
-        fidelity=replace(found.fidelity, samples=1440),
+        result, points=(point,), objective=(Term(Measure(channels.CRANK_PIN_FORCE, NORMS["maximum"])),),
+        fidelity=replace(result.fidelity, samples=1440),
     )  # fmt: skip
     evaluation = evaluate(problem)
     value = objective_value(problem, evaluation)

@@ -110,9 +110,9 @@ def test_units_of_mass_length_and_time(seed: int, mass: float, length: float, ti
     ]  # fmt: skip
     mounts = [replace(m, position=tuple(c * length for c in m.position)) for m in engine.mounts]
     points = tuple(_rescaled(point, pressure, time) for point in problem.points)
-    found = replace(_changed(problem, parts, rotors, mounts), points=points)
+    result = replace(_changed(problem, parts, rotors, mounts), points=points)
     (term,) = problem.objective
-    _same(found, problem, mass * length ** POWERS[term.measure.load] / time**2)
+    _same(result, problem, mass * length ** POWERS[term.measure.load] / time**2)
 
 
 def _rescaled(point: OperatingPoint, pressure: float, time: float) -> OperatingPoint:

@@ -71,7 +71,7 @@ def test_motion_solves_the_differential_equation() -> None:
 
     period = engine.cycle.angle / POINT.speed
     times = period * np.arange(1440) / 1440
-    found = solve_ivp(
+    result = solve_ivp(
         slope,
         (0.0, period),
         [motion.angle[0], motion.speed[0]],
@@ -81,7 +81,7 @@ def test_motion_solves_the_differential_equation() -> None:
         max_step=period / 700,
     )
     assert motion.unevenness > 0.05
-    assert np.abs(found.y[1] - motion.speed).max() <= 2e-5 * POINT.speed
+    assert np.abs(result.y[1] - motion.speed).max() <= 2e-5 * POINT.speed
     assert motion.angle[0] == pytest.approx(0.0, abs=1e-12)
 
 

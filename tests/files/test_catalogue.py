@@ -32,14 +32,14 @@ def test_there_are_at_least_thirty() -> None:
 @pytest.mark.parametrize("key", engines())
 def test_bore_and_stroke_make_the_published_displacement(key: str, tmp_path: Path) -> None:
     """Bore, stroke and number of cylinders come from the source; so does the displacement, told on its own."""
-    found = engines()[key]
+    result = engines()[key]
     parts = _problem(tmp_path, key).engine.slider_cranks
     volume = sum(0.25 * math.pi * (part.bore or 0.0) ** 2 * part.stroke for part in parts)
-    assert volume == pytest.approx(1e-6 * float(found.displacement.split()[0]), rel=0.004)
-    assert found.source
-    assert found.engine["layout"] in LAYOUTS
-    assert set(found.assumed) <= set(found.engine)
-    assert "reciprocating_mass" in found.assumed
+    assert volume == pytest.approx(1e-6 * float(result.displacement.split()[0]), rel=0.004)
+    assert result.source
+    assert result.engine["layout"] in LAYOUTS
+    assert set(result.assumed) <= set(result.engine)
+    assert "reciprocating_mass" in result.assumed
 
 
 @pytest.mark.parametrize(
@@ -54,8 +54,8 @@ def test_bore_and_stroke_make_the_published_displacement(key: str, tmp_path: Pat
     ],
 )
 def test_cranks_fire_as_their_makers_say(key: str, intervals: list[float], tmp_path: Path) -> None:
-    found = sorted(math.degrees(angle) for angle in _problem(tmp_path, key).engine.firing_intervals)
-    assert found == pytest.approx(intervals)
+    result = sorted(math.degrees(angle) for angle in _problem(tmp_path, key).engine.firing_intervals)
+    assert result == pytest.approx(intervals)
 
 
 def test_cross_plane_engines_of_three_makers_have_one_crank(tmp_path: Path) -> None:

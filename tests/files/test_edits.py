@@ -44,10 +44,10 @@ def test_a_value_by_name_is_that_of_a_file(problem: Problem) -> None:
     changed = text.replace("rod_ratio = 0.26", "rod_ratio = 0.28").replace(
         'mass  = { between = ["0 kg", "3 kg"] }', 'mass  = { between = ["0 kg", "3 kg"], start = "1.2 kg" }', 1
     )
-    found = problem.with_values({"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28})
-    assert found.engine == laufruhe.load(changed).engine
-    assert found.decisions == laufruhe.load(changed).decisions
-    assert found.decisions != problem.decisions
+    result = problem.with_values({"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28})
+    assert result.engine == laufruhe.load(changed).engine
+    assert result.decisions == laufruhe.load(changed).decisions
+    assert result.decisions != problem.decisions
     assert problem.decisions[0].start == 0.0
 
 
@@ -108,8 +108,8 @@ def test_leads_and_rims_take_values_by_the_names_that_results_show(name: str) ->
     problem = laufruhe.load(PROBLEMS / f"{name}.toml")
     for decision in problem.decisions:
         for entry in decision_values(decision, 0.3 * decision.lower + 0.7 * decision.upper):
-            found = problem.with_values({entry.name: f"{entry.value!r} {entry.unit}".rstrip()})
-            moved = {d.name: d.start for d in found.decisions}
+            result = problem.with_values({entry.name: f"{entry.value!r} {entry.unit}".rstrip()})
+            moved = {d.name: d.start for d in result.decisions}
             assert moved.pop(decision.name) == pytest.approx(entry.value, rel=1e-12)
             assert moved == {d.name: d.start for d in problem.decisions if d is not decision}
 
@@ -135,9 +135,9 @@ def test_shafts_that_a_star_leaves_out_are_left_out() -> None:
     problem = laufruhe.load(PROBLEMS / "two-stroke-four-open.toml")
     throws = {f"throw {k + 1}": f"{angle} deg" for k, angle in enumerate((0, 90, 270, 180))}
     for built in (0, 1):
-        found = problem.with_values({**throws, "balancer built": built})
-        assert any(rotor.shaft.name == "balancer" for rotor in found.engine.rotors) is bool(built)
-        assert found.phasing is None or found.phasing.throws is not None
+        result = problem.with_values({**throws, "balancer built": built})
+        assert any(rotor.shaft.name == "balancer" for rotor in result.engine.rotors) is bool(built)
+        assert result.phasing is None or result.phasing.throws is not None
 
 
 def test_more_freedom_is_never_worse(problem: Problem) -> None:
@@ -184,8 +184,8 @@ def test_an_engine_without_points_is_refused(problem: Problem) -> None:
 
 
 def test_a_problem_goes_to_another_process(problem: Problem) -> None:
-    found = pickle.loads(pickle.dumps(problem))
-    assert found.fix("front web.mass", "1 kg").engine == problem.fix("front web.mass", "1 kg").engine
+    result = pickle.loads(pickle.dumps(problem))
+    assert result.fix("front web.mass", "1 kg").engine == problem.fix("front web.mass", "1 kg").engine
 
 
 @pytest.mark.parametrize(("names", "rotor_names"), [

@@ -51,8 +51,8 @@ def test_a_file_of_a_part_of_the_cycle_repeats(tmp_path: Path, degrees: np.ndarr
     assert load_of(problem).periods == periods
     angles = np.radians(np.arange(0.0, 720.0, 5.0) + 10.0)
     still = laufruhe.physics.torque.crank_torque(problem.engine, problem.points[0]).mapped(lambda values: 0.0 * values)
-    found = less_load(still, problem.engine, problem.points[0], EXACT).values(angles)
-    assert found == pytest.approx(-20.0 * np.cos(3.0 * (angles - np.radians(10.0))), abs=0.3)
+    result = less_load(still, problem.engine, problem.points[0], EXACT).values(angles)
+    assert result == pytest.approx(-20.0 * np.cos(3.0 * (angles - np.radians(10.0))), abs=0.3)
 
 
 @pytest.mark.parametrize(

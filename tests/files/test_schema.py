@@ -175,11 +175,11 @@ def test_words_of_keys_are_of_keys_that_there_are() -> None:
 def test_numbers_are_checked_with_their_unit(validator: jsonschema.Draft7Validator) -> None:
     """Whatever the reader shows as an example of a dimension passes, and no other dimension's example does."""
     for unit in NUMBERS:
-        found = re.compile(units.pattern(unit))
-        assert found.match(units.example(unit))
+        result = re.compile(units.pattern(unit))
+        assert result.match(units.example(unit))
         # a speed of rotation may be given as turns a second
         others = [other for other in NUMBERS if other != unit and (unit, other) != ("rad/s", "Hz")]
-        assert not [other for other in others if found.match(units.example(other))]
+        assert not [other for other in others if result.match(units.example(other))]
 
 
 @pytest.mark.parametrize("is_study", [False, True], ids=["problem", "study"])

@@ -139,8 +139,8 @@ class TestCrankPinLoad:
             rotating_mass=self.rod.rotating_mass, bore=0.080,
         )  # fmt: skip
         engine = Engine("single", Cycle.FOUR_STROKE, (part,))
-        found = pin_forces(engine, OperatingPoint("example 3", self.speed, gas), TWO_ORDER)
-        pin = found.values(np.array([self.alpha]))[0, 0]
+        result = pin_forces(engine, OperatingPoint("example 3", self.speed, gas), TWO_ORDER)
+        pin = result.values(np.array([self.alpha]))[0, 0]
         # the drawing and the chain of three digits, as above
         assert float(np.linalg.norm(pin)) == pytest.approx(3517, abs=20.0)
         f, s = self.rod_centrifugal_force(), self.rod_force()

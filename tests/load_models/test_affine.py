@@ -125,20 +125,20 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
     x = x * affine.scales
     exact = evaluate(p, p.design([d.complex_value(x) for d in m.domains]), samples * periods)
     for quantity, (_, norm) in zip(QUANTITIES, affine.terms, strict=True):
-        expected, found = exact.rows(quantity), steps_of(norm.rows(x), norm.grid)
+        expected, result = exact.rows(quantity), steps_of(norm.rows(x), norm.grid)
         given = steps_of(expected.vectors, expected.grid)
         size = float(np.abs(given).max() + np.abs(norm.constant).max() + np.abs(norm.slope @ affine.scales).max())
         # a load has the rows of its own period alone
-        own = len(found) if quantity.is_mass else norm.grid.steps - norm.grid.kinks
+        own = len(result) if quantity.is_mass else norm.grid.steps - norm.grid.kinks
         again = 1 if quantity.is_mass else samples * periods // own
         whole = given.reshape(-1, again, own, given.shape[1])
         for k in range(again):
-            one = whole[:, k].reshape(len(found), -1)
-            np.testing.assert_allclose(lengths(found), lengths(one), rtol=0.0, atol=1e-11 * size)
+            one = whole[:, k].reshape(len(result), -1)
+            np.testing.assert_allclose(lengths(result), lengths(one), rtol=0.0, atol=1e-11 * size)
             # components that are always zero are left out, the others keep their order
             used = one.any(axis=0)
-            if used.sum() == found.shape[1]:
-                np.testing.assert_allclose(found, one[:, used], rtol=0.0, atol=1e-11 * size)
+            if used.sum() == result.shape[1]:
+                np.testing.assert_allclose(result, one[:, used], rtol=0.0, atol=1e-11 * size)
         assert norm.grid.weights.sum() == pytest.approx(expected.grid.weights.sum(), rel=1e-12)
         assert norm.value(x) == pytest.approx(expected.value, rel=1e-11, abs=1e-11 * size)
         # else every design and every gradient copies them
@@ -155,14 +155,14 @@ def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) 
     x = x * affine.scales
     exact = evaluate(p, p.design([d.complex_value(x) for d in m.domains]), 96)
     for measure, (_, norm) in zip(INSIDE, affine.terms, strict=True):
-        expected, found = exact.rows(measure), steps_of(norm.rows(x), norm.grid)
+        expected, result = exact.rows(measure), steps_of(norm.rows(x), norm.grid)
         used = expected.vectors.any(axis=0)
         size = float(np.abs(expected.vectors).max())
         # the torque of the crank repeats within the cycle, and has the rows of its own period alone
         own = norm.grid.steps - norm.grid.kinks
         whole = steps_of(expected.vectors[:, used], expected.grid).reshape(-1, 96 // own, own, used.sum())
         for period in np.moveaxis(whole, 1, 0):
-            np.testing.assert_allclose(found, period.reshape(found.shape), rtol=0.0, atol=1e-11 * size)
+            np.testing.assert_allclose(result, period.reshape(result.shape), rtol=0.0, atol=1e-11 * size)
         assert norm.value(x) == pytest.approx(expected.value, rel=1e-11)
     acts = [np.abs(norm.slope).max() for measure, (_, norm) in zip(INSIDE, affine.terms, strict=True)
             if measure.channel is channels.MAIN_BEARING_FORCE]  # fmt: skip

@@ -17,8 +17,8 @@ def test_roundings_of_what_cancels_are_nothing_and_small_rows_stay() -> None:
     moves[1, 2] = -0.5 + np.where(np.arange(rows)[:, None] % 2 == 0, left, -left)
     turns = moves[..., None]
     norm = StarNorm(NORMS["mean"], constant, moves, constant[..., None], turns, Grid(np.full(rows, 1.0 / rows), rows))
-    found = norm.at([1, 2])
-    for part in (found.constant, found.slope[..., 0]):
+    result = norm.at([1, 2])
+    for part in (result.constant, result.slope[..., 0]):
         assert not part[:, 0].any()
         assert np.allclose(np.abs(part[:, 1]), 1e-12, rtol=1e-3, atol=0.0)
     assert np.array_equal(norm.at([0, 0]).constant, constant)
@@ -28,10 +28,10 @@ def test_fewer_rows_have_the_length_of_all() -> None:
     """Check that compressed rows keep the length of any sum of three arrays, and that few rows stay as they are."""
     r = np.random.default_rng(3)
     parts = [r.normal(size=(40, 2)), r.normal(size=(2, 3, 40, 2))]
-    found = compress_rows(parts)
-    assert found is not None
-    assert found[0].shape == (7, 1)
+    result = compress_rows(parts)
+    assert result is not None
+    assert result[0].shape == (7, 1)
     for weights in r.normal(size=(5, 2, 3)):
-        whole, few = (a + np.einsum("ij,ijkd->kd", weights, b) for a, b in (parts, found))
+        whole, few = (a + np.einsum("ij,ijkd->kd", weights, b) for a, b in (parts, result))
         assert np.isclose(np.linalg.norm(whole), np.linalg.norm(few), rtol=1e-12)
     assert compress_rows([r.normal(size=(3, 2)), r.normal(size=(5, 3, 2))]) is None

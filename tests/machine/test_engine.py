@@ -122,9 +122,9 @@ class TestFiringIntervals:
             replace(PART, name=f"{k}", x=float(k), throw=math.radians(-f), firing_angle=math.radians(f))
             for k, f in enumerate(fires)
         )
-        found = engine(*parts, cycle=cycle).firing_intervals
-        assert [math.degrees(a) for a in found] == pytest.approx(intervals)
-        assert sum(found) == pytest.approx(cycle.angle)
+        result = engine(*parts, cycle=cycle).firing_intervals
+        assert [math.degrees(a) for a in result] == pytest.approx(intervals)
+        assert sum(result) == pytest.approx(cycle.angle)
 
     def test_nothing_that_fires(self) -> None:
         assert engine().firing_intervals == ()

@@ -41,11 +41,11 @@ def least_deviation(cycle, throws, angle):
 @pytest.mark.parametrize(("cycle", "throws"), [(Cycle.TWO_STROKE, 2), (Cycle.FOUR_STROKE, 2), (Cycle.TWO_STROKE, 3)])
 def test_nothing_is_more_even(cycle, throws, angle):
     patterns, complete = slots(cycle, throws, angle, 0.0).patterns()
-    found = max(abs(i - cycle.angle / throws / 2) for i in patterns[0].intervals(cycle))
+    result = max(abs(i - cycle.angle / throws / 2) for i in patterns[0].intervals(cycle))
     assert complete
-    assert found == pytest.approx(patterns[0].broken, abs=1e-7)
+    assert result == pytest.approx(patterns[0].broken, abs=1e-7)
     grid = least_deviation(cycle, throws, angle)
-    assert math.degrees(found) - 1e-6 <= grid <= math.degrees(found) + GRID
+    assert math.degrees(result) - 1e-6 <= grid <= math.degrees(result) + GRID
 
 
 @pytest.mark.parametrize(

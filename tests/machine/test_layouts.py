@@ -185,8 +185,8 @@ class TestFiring:
         self, cycle: Cycle, layout: Layout, throws: tuple[int, ...], order: list[int], fires: list[int]
     ) -> None:
         """Crank angles of every cylinder's firing, counted from that of cylinder 1."""
-        found = firing_angles(cycle, layout, tuple(map(math.radians, throws)), order)
-        assert np.degrees(found) == pytest.approx(fires, abs=1e-9)
+        result = firing_angles(cycle, layout, tuple(map(math.radians, throws)), order)
+        assert np.degrees(result) == pytest.approx(fires, abs=1e-9)
 
     def test_intervals_that_are_given_are_those_of_the_dead_centres(self) -> None:
         """Three throws that fire at 0, 200 and 450 deg, whichever number is last; another interval is refused."""
@@ -194,8 +194,8 @@ class TestFiring:
             fires = dict(zip(order, (0.0, 200.0, 450.0), strict=True))
             throws = tuple(math.radians(-fires[k]) for k in (1, 2, 3))
             intervals = [math.radians(x) for x in (200.0, 250.0, 270.0)]
-            found = firing_angles(FOUR, inline(3, 0.1), throws, order, intervals)
-            assert np.degrees(found) == pytest.approx([fires[k] for k in (1, 2, 3)], abs=1e-9)
+            result = firing_angles(FOUR, inline(3, 0.1), throws, order, intervals)
+            assert np.degrees(result) == pytest.approx([fires[k] for k in (1, 2, 3)], abs=1e-9)
             with pytest.raises(ModelError, match=f"cylinder {order[1]} would fire 190 deg after cylinder 1"):
                 firing_angles(FOUR, inline(3, 0.1), throws, order, [math.radians(x) for x in (190.0, 260.0, 270.0)])
 

@@ -68,14 +68,14 @@ class TestStroke:
         part = SliderCrank("c", 0.0, radius, length, 1.0, offset=offset)
         if by_ratio:
             # a long rod with a large offset has the stroke of a second, smaller crank too
-            found = radius_for_stroke(part.stroke, offset, rod_ratio=part.rod_ratio)
-            other = SliderCrank("c", 0.0, found, found / part.rod_ratio if part.rod_ratio else math.inf, 1.0)
-            assume(abs(offset) < other.rod_length - found)
-            again = SliderCrank("c", 0.0, found, other.rod_length, 1.0, offset=offset)
+            result = radius_for_stroke(part.stroke, offset, rod_ratio=part.rod_ratio)
+            other = SliderCrank("c", 0.0, result, result / part.rod_ratio if part.rod_ratio else math.inf, 1.0)
+            assume(abs(offset) < other.rod_length - result)
+            again = SliderCrank("c", 0.0, result, other.rod_length, 1.0, offset=offset)
             assert again.stroke == pytest.approx(part.stroke, rel=1e-9)
         else:
-            found = radius_for_stroke(part.stroke, offset, rod_length=length)
-            assert found == pytest.approx(radius, rel=1e-9)
+            result = radius_for_stroke(part.stroke, offset, rod_length=length)
+            assert result == pytest.approx(radius, rel=1e-9)
 
     @pytest.mark.parametrize("rod", [{"rod_length": 0.2}, {"rod_ratio": 0.26}, {"rod_ratio": 0.0}, {}])
     def test_without_offset_half_the_stroke_exactly(self, rod: dict[str, float]) -> None:

@@ -304,24 +304,24 @@ def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
     met = given is not None and given.violation(problem.limits) <= 0.0
     if met and result.status in (Status.INFEASIBLE, Status.FAILED):
         out.append(f"{result.status}, and the design as given keeps all limits")
-    found = searched(problem, result, seed, budget)
-    if result.status is Status.FAILED and found.violation <= 0.0:
-        out.append(f"{result.message}, and a design keeps all limits with {found.violation:.2e}")
+    actual = searched(problem, result, seed, budget)
+    if result.status is Status.FAILED and actual.violation <= 0.0:
+        out.append(f"{result.message}, and a design keeps all limits with {actual.violation:.2e}")
     if result.status is Status.INFEASIBLE:
         if not result.conflict:
             out.append("infeasible, and no limit is named")
-        if found.violation <= -CLEAR:
-            out.append(f"infeasible, and a design keeps all limits with {found.violation:.2e}")
+        if actual.violation <= -CLEAR:
+            out.append(f"infeasible, and a design keeps all limits with {actual.violation:.2e}")
         return out
     if result.objective is None or result.certificate is None:
         return out
     value, bound = result.objective.value, result.certificate.lower_bound
     if met and given is not None and value > objective_value(problem, given) * (1.0 + 1e-9):
         out.append(f"worse than the design as given: {value} > {objective_value(problem, given)}")
-    if found.value < bound * (1.0 - 1e-9):
-        out.append(f"false bound: {bound}, {found.value} is reached")
-    if result.status is Status.OPTIMAL and found.value < value * (1.0 - 1.5e-4):
-        out.append(f"false optimum: {value}, {found.value} is reached")
+    if actual.value < bound * (1.0 - 1e-9):
+        out.append(f"false bound: {bound}, {actual.value} is reached")
+    if result.status is Status.OPTIMAL and actual.value < value * (1.0 - 1.5e-4):
+        out.append(f"false optimum: {value}, {actual.value} is reached")
     if result.final.violation(problem.limits) > 1.1e-5 and result.status is not Status.FAILED:
         out.append(f"breaks a limit by {result.final.violation(problem.limits):.2e}")
     return out

@@ -123,8 +123,8 @@ def test_a_failed_cone_solve_finds_the_least_excess(tmp_path: Path) -> None:
         x = low + np.clip(share, 0.0, 1.0) * (high - low)
         return with_mounts(given, problem.design(x.tolist())).violation(problem.limits)
 
-    found = minimize(violation, np.full(len(low), 0.2), method="Nelder-Mead", options={"maxfev": 600})
-    assert found.fun > 1e-4
+    actual = minimize(violation, np.full(len(low), 0.2), method="Nelder-Mead", options={"maxfev": 600})
+    assert actual.fun > 1e-4
 
 
 def test_a_solver_without_numbers_leaves_a_design_and_no_traceback(tmp_path: Path, monkeypatch) -> None:

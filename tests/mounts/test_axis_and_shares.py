@@ -76,8 +76,8 @@ def _joint_least_squares(problem, low, high):
     columns = np.column_stack([slopes.T, -1e4 * (m @ q)])
     lower = [*(d.lower / unit for d in decisions), low / 1e4]
     upper = [*(d.upper / unit for d in decisions), high / 1e4]
-    found = lsq_linear(columns, -zero, bounds=(lower, upper), tol=1e-14)
-    return math.sqrt(2.0 * found.cost)
+    result = lsq_linear(columns, -zero, bounds=(lower, upper), tol=1e-14)
+    return math.sqrt(2.0 * result.cost)
 
 
 @pytest.mark.parametrize(

@@ -116,8 +116,8 @@ def test_stiff_mounts_become_rigid_ones():
     for stiffer in (1e5, 1e7, 1e9):
         elastic = powertrain(stiffer=stiffer)
         rigid = rigid_mounting(tuple(replace(m, position=m.position) for m in elastic.mounts)).forces(load).coefficients
-        found = elastic.forces(load, 1500 * RPM).coefficients
-        errors.append(np.abs(found - rigid).max() / np.abs(rigid).max())
+        result = elastic.forces(load, 1500 * RPM).coefficients
+        errors.append(np.abs(result - rigid).max() / np.abs(rigid).max())
     assert errors[2] < 1e-6
     # the distance is that of (W / w)^2
     assert errors[0] / errors[1] == pytest.approx(100.0, rel=0.1)
@@ -197,11 +197,11 @@ def test_free_modes_that_damping_couples_follow_the_plain_system():
     assert mounting.modes.free.sum() == 3
     values = wrench(5).coefficients
     values[0] = [0.0, 0.0, 400.0, 0.0, 0.0, 0.0]
-    found = motion(mounting, Spectrum(Fraction(1), values), speed).coefficients
-    assert np.linalg.lstsq(mounting.stiffness, values[0].real)[0] == pytest.approx(found[0], abs=1e-15)
+    result = motion(mounting, Spectrum(Fraction(1), values), speed).coefficients
+    assert np.linalg.lstsq(mounting.stiffness, values[0].real)[0] == pytest.approx(result[0], abs=1e-15)
     for h in range(1, 5):
         system = mounting.stiffness + 1j * mounting.total(mounting.losses) - (h * speed) ** 2 * CUBE.mass_matrix
-        assert found[h] == pytest.approx(np.linalg.solve(system, values[h]), rel=1e-9)
+        assert result[h] == pytest.approx(np.linalg.solve(system, values[h]), rel=1e-9)
 
 
 def test_ever_smaller_loads_move_in_proportion():

@@ -49,8 +49,8 @@ def test_the_force_of_a_track_is_that_of_its_fluid_in_time(hertz: float) -> None
 
     last = 3.0 + math.tau / omega
     times = np.linspace(3.0, last, 40)
-    found = solve_ivp(rates, (0.0, last), [0.0, 0.0], "DOP853", t_eval=times, rtol=1e-11, atol=1e-13).y[0]
-    force = TRACK.bulge * (np.cos(omega * times) - found)
+    result = solve_ivp(rates, (0.0, last), [0.0, 0.0], "DOP853", t_eval=times, rtol=1e-11, atol=1e-13).y[0]
+    force = TRACK.bulge * (np.cos(omega * times) - result)
     ours = (TRACK.at(np.array([omega]))[0] * np.exp(1j * omega * times)).real
     assert ours == pytest.approx(force, abs=1e-6 * np.abs(force).max())
 
@@ -113,16 +113,16 @@ def test_forces_are_those_of_block_and_fluid_together(seed: int) -> None:
 
 def test_natural_frequencies_with_fluid_are_where_the_whole_is_singular() -> None:
     mounting = hydraulic(2, damping=0.0, track=replace(TRACK, damping=0.0))
-    found = frequencies_with_fluid(mounting)
-    assert len(found) == 8
-    for hertz in found:
+    result = frequencies_with_fluid(mounting)
+    assert len(result) == 8
+    for hertz in result:
         omega = np.array([math.tau * hertz])
         whole = mounting.stiffness + mounting.dynamic.impedance(omega, np.eye(6))[0].real
         values = np.linalg.eigvals(np.linalg.solve(mounting.block.mass_matrix, whole)).real
         assert np.abs(values / omega[0] ** 2 - 1.0).min() < 1e-6
     load = Spectrum(wrench().base, np.array([np.zeros(6), np.full(6, 10.0)], dtype=complex))
     with pytest.raises(ResonanceError, match="fluid tracks"):
-        mounting.forces(load, math.tau * found[3])
+        mounting.forces(load, math.tau * result[3])
 
 
 def test_the_steady_state_in_time_is_that_of_every_order() -> None:
@@ -179,8 +179,8 @@ def test_symbols_and_numbers_agree(tmp_path: Path) -> None:
     omegas, at = np.array([40.0, 80.0]), loads.coefficients[1:]
     drive = at @ (time_model(mounting).load[:6]).T
     spectrum = SymbolicSpectrum(omegas, ca.DM(drive.real.T.copy()), ca.DM(drive.imag.T.copy()))
-    found = response(symbols, OperatingPoint("one", 1.0), spectrum).force
-    real, imag = (np.array(ca.evalf(part)) for part in (found.real, found.imaginary))
+    result = response(symbols, OperatingPoint("one", 1.0), spectrum).force
+    real, imag = (np.array(ca.evalf(part)) for part in (result.real, result.imaginary))
     theirs = mounting.forces(loads, 40.0).coefficients[1:].reshape(2, -1).T
     assert real + 1j * imag == pytest.approx(theirs, rel=1e-9, abs=1e-9 * np.abs(theirs).max())
 

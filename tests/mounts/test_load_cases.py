@@ -50,8 +50,8 @@ torque = "400 N m"
 
 def test_weight_alone_is_the_sag() -> None:
     mounting = random_mounting(4)
-    found = settled(mounting, LoadCase("weight", times_weight=(0.0, 0.0, -1.0)))
-    assert -found.motion[2] == pytest.approx(mount_numbers.sag(mounting), rel=1e-10)
+    result = settled(mounting, LoadCase("weight", times_weight=(0.0, 0.0, -1.0)))
+    assert -result.motion[2] == pytest.approx(mount_numbers.sag(mounting), rel=1e-10)
 
 
 def test_limits_of_load_cases_are_found_by_the_names_of_results() -> None:
@@ -64,9 +64,9 @@ def test_limits_of_load_cases_are_found_by_the_names_of_results() -> None:
 def test_mounts_carry_the_load(case: LoadCase) -> None:
     stopped = [replace(m, stop_gap=5e-4, stop_stiffness=2e6) for m in random_mounting(2).mounts]
     mounting = elastic_mounting(random_mounting(2).block, stopped)
-    found, centre = settled(mounting, case), np.array(mounting.block.centre_of_gravity)
+    result, centre = settled(mounting, case), np.array(mounting.block.centre_of_gravity)
     arms = np.array([mount.position for mount in mounting.mounts]) - centre
-    carried = np.concatenate([found.force.sum(axis=0), np.cross(arms, found.force).sum(axis=0)])
+    carried = np.concatenate([result.force.sum(axis=0), np.cross(arms, result.force).sum(axis=0)])
     assert carried == pytest.approx(case_wrench(mounting.block, case), rel=1e-9, abs=1e-6)
 
 
@@ -76,7 +76,7 @@ def test_the_block_settles_where_its_energy_is_least(seed: int, case: LoadCase) 
     plain = random_mounting(seed)
     stopped = [replace(m, stop_gap=1e-4 * (k + 1), stop_stiffness=3e6) for k, m in enumerate(plain.mounts)]
     mounting = elastic_mounting(plain.block, stopped)
-    found, wrench, size = settled(mounting, case), case_wrench(plain.block, case), 1e-3
+    result, wrench, size = settled(mounting, case), case_wrench(plain.block, case), 1e-3
 
     def energy(x):
         q, total = size * x, 0.0
@@ -87,9 +87,9 @@ def test_the_block_settles_where_its_energy_is_least(seed: int, case: LoadCase) 
         return total - float(wrench @ q)
 
     other = minimize(energy, np.zeros(6), method="BFGS", options={"gtol": 1e-12, "maxiter": 5000})
-    assert energy(found.motion / size) <= other.fun + 1e-9 * abs(other.fun)
-    assert found.motion == pytest.approx(size * other.x, abs=2e-4 * np.abs(found.motion).max())
-    assert found.on_stops
+    assert energy(result.motion / size) <= other.fun + 1e-9 * abs(other.fun)
+    assert result.motion == pytest.approx(size * other.x, abs=2e-4 * np.abs(result.motion).max())
+    assert result.on_stops
 
 
 def test_a_travel_that_just_reaches_its_gap_is_found() -> None:
@@ -100,8 +100,8 @@ def test_a_travel_that_just_reaches_its_gap_is_found() -> None:
     reach = np.abs(rows @ settled(plain, case).motion).max()
     for share in np.concatenate([[0.0], np.logspace(-16, -6, 60), -np.logspace(-16, -6, 60)]):
         stopped = [replace(m, stop_gap=reach * (1.0 + share), stop_stiffness=3e7) for m in plain.mounts]
-        found = settled(elastic_mounting(plain.block, stopped), case)
-        assert np.abs(rows @ found.motion).max() == pytest.approx(reach, rel=2e-6)
+        result = settled(elastic_mounting(plain.block, stopped), case)
+        assert np.abs(rows @ result.motion).max() == pytest.approx(reach, rel=2e-6)
 
 
 def test_one_mount_meets_its_stop_as_two_springs_do() -> None:

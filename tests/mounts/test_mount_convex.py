@@ -94,14 +94,14 @@ def test_least_stiff_design_agrees_with_a_search(tmp_path):
     def design(x):
         return mounting_in(problem.design([float(v) * 1e5 for v in x]))
 
-    found = minimize(
+    actual = minimize(
         lambda x: total_stiffness(design(x).mounts) / 1e6, [5.0, 5.0], method="SLSQP", bounds=[(0.2, 40.0)] * 2,
         constraints=[{"type": "ineq", "fun": lambda x: (3e-3 - mount_numbers.sag(design(x))) * 1e3},
                      {"type": "ineq", "fun": lambda x: design(x).modes.frequencies[0] - 4.2}],
         options={"ftol": 1e-13},
     )  # fmt: skip
-    assert found.success
-    assert result.objective.value == pytest.approx(found.fun * 1e6, rel=1e-6)
+    assert actual.success
+    assert result.objective.value == pytest.approx(actual.fun * 1e6, rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["sag", "residual"])

@@ -192,10 +192,10 @@ class ScriptedSearch:
         self.best = self.best_or_initial = SearchResult(evaluate_design(problem, stiffness), None)
 
     def search_from(self, places):
-        found = SearchResult(evaluate_design(self.problem, places[0][0]), None)
-        is_better = found.rank < self.best.rank
+        result = SearchResult(evaluate_design(self.problem, places[0][0]), None)
+        is_better = result.rank < self.best.rank
         if is_better:
-            self.best = self.best_or_initial = found
+            self.best = self.best_or_initial = result
         return is_better
 
 
@@ -217,11 +217,11 @@ def test_boxes_bound_the_best_design_of_the_search(stiffness, count, tmp_path, m
     monkeypatch.setattr("laufruhe.solvers.mounts.nonlinear.run_provers", by_provers)
     search = ScriptedSearch(problem, [2e5, 2e5])
     given = search.best.design.value
-    found = bound_search(problem, search, False)
+    result = bound_search(problem, search, False)
     assert values[0] == pytest.approx(given, rel=1e-6)
     assert len(values) == count
     assert values[-1] == pytest.approx(search.best.design.value, rel=1e-6)
-    assert (found.bound, found.boxes) == (0.9 * values[-1], 3)
+    assert (result.bound, result.boxes) == (0.9 * values[-1], 3)
 
 
 def test_convex_terms_of_a_sum_are_bounded_by_their_optimum(tmp_path):
@@ -311,10 +311,10 @@ def test_limits_out_of_reach_are_not_met_and_said_so(tmp_path):
     assert result.status is Status.INFEASIBLE
     assert set(result.conflict) == {"static sag", "natural frequencies"}
     moved = problem_of(tmp_path, ENGINE, BLOCK, TURNED, FORCE.format(measure="mean"), hopeless, SEARCH)
-    found = solve_mounts(moved)
+    actual = solve_mounts(moved)
     # not stiffness alone: nothing is proven, and nothing proven is claimed
-    assert found.status is Status.FAILED
-    assert "no design was found" in found.message
+    assert actual.status is Status.FAILED
+    assert "no design was found" in actual.message
 
 
 @pytest.mark.slow

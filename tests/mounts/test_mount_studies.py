@@ -155,8 +155,8 @@ def test_studies_of_newer_mounts_have_the_loads_of_their_designs(tmp_path: Path,
     problem = '[objective]\nminimise = "mean mount force"\n' + SHAFT.partition("[search]")[0]
     draws = study(tmp_path, "random designs", "draws = 4", problem="")
     (tmp_path / "soft.toml").write_text(ENGINE + BLOCK + mounts + problem)
-    found, scene = computed(draws), load(tmp_path / "soft.toml")
-    for unbalance, objective in zip(found["left.unbalance"].values[0], found["objective"].values[0], strict=True):
+    result, scene = computed(draws), load(tmp_path / "soft.toml")
+    for unbalance, objective in zip(result["left.unbalance"].values[0], result["objective"].values[0], strict=True):
         design = scene.design([complex(unbalance)])
         assert objective == pytest.approx(objective_value(scene, evaluate(scene, design)), rel=1e-9)
     speed = scene.points[0].speed

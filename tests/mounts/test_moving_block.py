@@ -126,8 +126,8 @@ def simulated_forces(piston: float, flywheel: float = 1e-3, steps: int = STEPS) 
 
 def left_out(piston: float, flywheel: float = 1e-3, turns: bool = True) -> float:
     angles = 2 * math.pi * np.arange(1, STEPS + 1) / STEPS
-    found, expected = simulated_forces(piston, flywheel), linear_forces(piston, angles, flywheel, turns)
-    return float(np.abs(found - expected).max() / np.abs(found).max())
+    result, expected = simulated_forces(piston, flywheel), linear_forces(piston, angles, flywheel, turns)
+    return float(np.abs(result - expected).max() / np.abs(result).max())
 
 
 @pytest.mark.slow

@@ -12,9 +12,9 @@ from mutants.single_lines import ROOMS, SOURCE, all_mutants, drawn, mutants_of
 def test_a_mutant_is_one_other_line_that_python_reads() -> None:
     source = SOURCE / "laufruhe" / "physics" / "mount_forces.py"
     lines = source.read_text(encoding="utf-8").splitlines()
-    found = mutants_of(source)
-    assert len({(m.line, m.after) for m in found}) == len(found) > 20
-    for mutant in found:
+    result = mutants_of(source)
+    assert len({(m.line, m.after) for m in result}) == len(result) > 20
+    for mutant in result:
         changed = [*lines[: mutant.line - 1], mutant.after, *lines[mutant.line :]]
         assert lines[mutant.line - 1] == mutant.before != mutant.after
         ast.parse("\n".join(changed))

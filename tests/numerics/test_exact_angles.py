@@ -107,7 +107,7 @@ class TestStarSum:
     )
     def test_agrees_with_many_digits(self, members: list[tuple[Fraction | float, float]], multiple: int) -> None:
         turns, weights = [m[0] for m in members], np.array([[m[1]] for m in members])
-        found = star_sum(weights, turns, np.array([multiple]))[0, 0]
+        result = star_sum(weights, turns, np.array([multiple]))[0, 0]
         with mp.workdps(40):
             exact = mp.fsum(
                 mp.mpf(w)
@@ -116,28 +116,28 @@ class TestStarSum:
                 )
                 for t, w in members
             )
-            error = float(abs(mp.mpc(complex(found)) - exact))
+            error = float(abs(mp.mpc(complex(result)) - exact))
         rounding = (len(members) + 4) + 20 * abs(multiple)
         assert error <= rounding * EPS * float(np.abs(weights).sum())
 
     def test_remainders_above_rounding_stay(self) -> None:
         """A remainder of a hundred roundings is a load, not a zero."""
         weights = np.array([[1.0], [1.0 + 100 * EPS]])
-        found = star_sum(weights, [Fraction(0), Fraction(1, 2)], np.array([1]))[0, 0]
-        assert found.real == pytest.approx(-100 * EPS, rel=1e-3, abs=0.0)
+        result = star_sum(weights, [Fraction(0), Fraction(1, 2)], np.array([1]))[0, 0]
+        assert result.real == pytest.approx(-100 * EPS, rel=1e-3, abs=0.0)
 
     def test_each_column_has_a_rounding_of_its_own(self) -> None:
         """A small column beside a large one is not flushed with it."""
         weights = np.array([[1e9, 1e-9], [-1e9, 1e-9]])
-        found = star_sum(weights, [Fraction(0), Fraction(0)], np.array([0]))[0]
-        assert found.tolist() == [0.0, 2e-9]
+        result = star_sum(weights, [Fraction(0), Fraction(0)], np.array([0]))[0]
+        assert result.tolist() == [0.0, 2e-9]
 
     @pytest.mark.slow
     @given(st.lists(PARTS, min_size=1, max_size=6), st.integers(-10_000, 10_000))
     def test_phasors_of_exact_turns_are_table_values(self, turns: list[Fraction], multiple: int) -> None:
         """A multiple of an exact angle is exact as well, however large."""
-        found = phasors(turns, np.array([multiple]))[0]
-        assert [_bits(z) for z in found] == [_bits(cis(multiple * t % 1)) for t in turns]
+        result = phasors(turns, np.array([multiple]))[0]
+        assert [_bits(z) for z in result] == [_bits(cis(multiple * t % 1)) for t in turns]
 
     def test_large_denominators_do_without_a_table(self) -> None:
         turn = Fraction(1, 10**7)
@@ -152,9 +152,9 @@ class TestCancellingSums:
 
     @given(st.lists(st.complex_numbers(max_magnitude=1e3), min_size=1, max_size=8))
     def test_a_plain_sum_otherwise(self, terms: list[complex]) -> None:
-        found = cancelling_sums(np.array(terms)[:, None], (0,) * len(terms))[0, 0]
+        result = cancelling_sums(np.array(terms)[:, None], (0,) * len(terms))[0, 0]
         size = sum(abs(t.real) + abs(t.imag) for t in terms)
-        assert abs(complex(found) - sum(terms)) <= 4 * len(terms) * EPS * size
+        assert abs(complex(result) - sum(terms)) <= 4 * len(terms) * EPS * size
 
     def test_each_index_has_its_own(self) -> None:
         terms = np.array([[1.0, 2j], [0.5, 0.0], [-1.0, 1j], [0.25, 0.0]], dtype=complex)

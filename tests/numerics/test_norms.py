@@ -394,9 +394,9 @@ class TestSignals:
         _, signals, rng = scene(seed)
         points = shares(rng, len(signals))
         taken = norm.refinement * steps
-        found = norm.value(grid_of(points, taken), sampled(signals, taken))
+        result = norm.value(grid_of(points, taken), sampled(signals, taken))
         truth = fine_value(norm, signals, points)
-        assert abs(found - truth) <= norm.sampling_bound(signals, points, steps, 720) + 1e-4 * truth / FINE
+        assert abs(result - truth) <= norm.sampling_bound(signals, points, steps, 720) + 1e-4 * truth / FINE
 
 
 class TestWeightless:

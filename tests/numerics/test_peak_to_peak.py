@@ -89,6 +89,6 @@ def test_a_single_is_balanced_to_a_proven_optimum(tmp_path):
     def value(share):
         return objective_value(problem, evaluate(problem, problem.design([complex(float(share[0]))])))
 
-    found = minimize(value, [0.4], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9})
-    assert result.objective.value == pytest.approx(found.fun, rel=1e-6)
-    assert result.certificate.lower_bound <= found.fun * (1.0 + 1e-9)
+    actual = minimize(value, [0.4], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-9})
+    assert result.objective.value == pytest.approx(actual.fun, rel=1e-6)
+    assert result.certificate.lower_bound <= actual.fun * (1.0 + 1e-9)

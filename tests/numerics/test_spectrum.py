@@ -144,11 +144,11 @@ class TestSpectrumOf:
     @given(spectra(), st.booleans())
     def test_finds_the_coefficients_back(self, s: Spectrum, odd: bool) -> None:
         count = 2 * len(s.coefficients) + odd
-        found = spectrum_of(s.sample(count), s.base)
-        assert found.base == s.base
-        expected = np.zeros_like(found.coefficients)
+        result = spectrum_of(s.sample(count), s.base)
+        assert result.base == s.base
+        expected = np.zeros_like(result.coefficients)
         expected[: len(s.coefficients)] = s.coefficients
-        np.testing.assert_allclose(found.coefficients, expected, atol=1e-12)
+        np.testing.assert_allclose(result.coefficients, expected, atol=1e-12)
 
     @given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=17))
     def test_goes_through_every_sample(self, samples: list[float]) -> None:

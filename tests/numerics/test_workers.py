@@ -43,8 +43,8 @@ def power(pair: tuple[int, int]) -> int:
 
 @pytest.mark.parametrize("executor", [SERIAL, ThreadPoolExecutor(3)], ids=["here", "threads"])
 def test_every_piece_is_answered_once_by_any_executor(executor: Executor) -> None:
-    found = list(unordered_map(power, POWERS, executor))
-    assert sorted(found) == [(k, k**3) for k in range(40)]
+    result = list(unordered_map(power, POWERS, executor))
+    assert sorted(result) == [(k, k**3) for k in range(40)]
 
 
 @pytest.mark.slow

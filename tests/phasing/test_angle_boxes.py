@@ -151,8 +151,8 @@ def test_waves_and_windows_are_those_of_the_exact_model(text: str, gas: str, nam
             own = np.array([angles[part.pin], *angles[waves.throws :]])
             turned = np.exp(1j * (waves.orders @ own - math.tau * lap * waves.orders[:, 0]))
             rows += np.einsum("h,hkd->kd", turned, wave).real
-        found = norm.fixed.norm.value(norm.fixed.grid, rows)
-        assert found == pytest.approx(evaluate(there).value(measure), rel=1e-6, abs=norm.left_out)
+        result = norm.fixed.norm.value(norm.fixed.grid, rows)
+        assert result == pytest.approx(evaluate(there).value(measure), rel=1e-6, abs=norm.left_out)
     assert seen > 2
 
 

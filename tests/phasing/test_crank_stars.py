@@ -47,8 +47,8 @@ def test_sums_are_the_definition(phases, steps, order):
     star = np.array([[step % phases for step in steps]], dtype=np.uint8)
     x = np.linspace(-1.0, 2.0, len(steps))
     waves = np.exp(2j * np.pi * order * star[0] / phases)
-    found = star_sums(star, phases, x, (order,))[0, 0]
-    np.testing.assert_allclose(found, [waves.sum(), (x * waves).sum()], atol=1e-12)
+    result = star_sums(star, phases, x, (order,))[0, 0]
+    np.testing.assert_allclose(result, [waves.sum(), (x * waves).sum()], atol=1e-12)
 
 
 def test_stars_that_cancel_score_zero():
@@ -75,9 +75,9 @@ def test_every_star_is_listed_once(throws, mirror, reflect):
     space = StarSpace(throws, ((1,) * throws,), places(throws), mirror, reflect)
     every = np.array([(0, *rest) for rest in itertools.permutations(range(1, throws))], dtype=np.uint8)
     expected = np.unique(space.canonical(every), axis=0)
-    found = np.concatenate(list(space.blocks()))
+    result = np.concatenate(list(space.blocks()))
     assert len(every) == space.size
-    assert sorted(map(tuple, found)) == sorted(map(tuple, expected))
+    assert sorted(map(tuple, result)) == sorted(map(tuple, expected))
 
 
 @pytest.mark.parametrize("pattern", [(2, 2), (2, 2, 2), (2, 0, 2, 0), (1, 2, 1)])
@@ -89,9 +89,9 @@ def test_throws_side_by_side_are_listed_once(pattern):
     assert len(every) == space.size
     expected = np.unique(space.canonical(every), axis=0)
     # images of a pattern with gaps may use other steps: those stay under their own pattern
-    found = np.concatenate(list(space.blocks()))
+    result = np.concatenate(list(space.blocks()))
     of_pattern = [tuple(s) for s in expected if tuple(np.bincount(s, minlength=phases)) == pattern]
-    assert sorted(map(tuple, found)) == sorted(of_pattern)
+    assert sorted(map(tuple, result)) == sorted(of_pattern)
 
 
 def test_memory_does_not_grow_with_the_number_of_stars():

@@ -64,11 +64,11 @@ def test_search_equals_solving_every_design(tmp_path, cylinders, name):
     model, stars = model_of(problem)
     nothing = numerical_zero(problem)
     every = search_designs(model, stars, 10**9, 1e-4, zero_level=nothing)
-    found = search_designs(model, stars, 1, 1e-4, zero_level=nothing)
+    result = search_designs(model, stars, 1, 1e-4, zero_level=nothing)
     assert len(every.solved) == every.designs
-    assert found.solved[0].value == pytest.approx(every.solved[0].value, rel=2e-4, abs=nothing)
-    assert found.lower_bound <= every.solved[0].value * (1.0 + 1e-9)
-    assert gap_of(found.solved[0].value, found.lower_bound, nothing) <= 2e-4
+    assert result.solved[0].value == pytest.approx(every.solved[0].value, rel=2e-4, abs=nothing)
+    assert result.lower_bound <= every.solved[0].value * (1.0 + 1e-9)
+    assert gap_of(result.solved[0].value, result.lower_bound, nothing) <= 2e-4
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -119,9 +119,9 @@ def test_a_shaft_that_has_to_be_heavy_is_left_out_where_it_harms(tmp_path):
     sets = model.phasing.shafts.allowed
     every = {built: solve_design(model, tuple(map(int, stars[0])), built, 1e-4)[0].value for built in sets}
     assert min(every, key=every.get) == (1,)
-    found = search_designs(model, stars[:1], 1, 1e-4)
-    assert found.lower_bound <= min(every.values())
-    assert found.solved[0].value == pytest.approx(min(every.values()), rel=2e-4)
+    result = search_designs(model, stars[:1], 1, 1e-4)
+    assert result.lower_bound <= min(every.values())
+    assert result.solved[0].value == pytest.approx(min(every.values()), rel=2e-4)
 
 
 def test_a_shaft_that_no_design_needs_is_not_built(tmp_path):
@@ -149,11 +149,11 @@ def test_a_limit_that_nothing_open_moves_leaves_a_star_its_optimum(tmp_path):
 def test_designs_marked_as_proven_are_the_best(tmp_path):
     problem = engines.problem(tmp_path, 5, phasing="best = 2", rest=CASES["rms"])
     model, stars = model_of(problem)
-    found = search_even(problem, problem.phasing, families_of(problem.phasing)[0])
+    result = search_even(problem, problem.phasing, families_of(problem.phasing)[0])
     values = _distinct_values(model.space, search_designs(model, stars, 10**9, 1e-4).solved)
-    assert found.looked_at < len(stars)
-    assert [design.proven for design in found.designs] == [True, True]
-    assert [design.value for design in found.designs] == pytest.approx(values[:2], rel=2e-4)
+    assert result.looked_at < len(stars)
+    assert [design.proven for design in result.designs] == [True, True]
+    assert [design.value for design in result.designs] == pytest.approx(values[:2], rel=2e-4)
 
 
 def test_designs_count_once_with_their_mirror_images_alone(tmp_path):
@@ -205,10 +205,10 @@ def test_limits_that_contradict_each_other_at_one_star_exclude_others(tmp_path):
     excluded = np.array([cut.excludes(stars, [()], owners)[:, 0] for solved, cut in answers if solved is None])
     assert not excluded[:, ~without].any()
     assert excluded[:, without].sum() > 2 * without.sum()
-    found = search_designs(model, stars, 10**9, 1e-4)
-    assert len(found.solved) == (~without).sum()
-    assert 0 < found.infeasible < without.sum()
-    assert found.solved[0].value == pytest.approx(min(solved.value for solved, _ in answers if solved), rel=2e-4)
+    result = search_designs(model, stars, 10**9, 1e-4)
+    assert len(result.solved) == (~without).sum()
+    assert 0 < result.infeasible < without.sum()
+    assert result.solved[0].value == pytest.approx(min(solved.value for solved, _ in answers if solved), rel=2e-4)
 
 
 @pytest.mark.slow

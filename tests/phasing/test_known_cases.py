@@ -77,8 +77,8 @@ def test_four_stroke_four_and_six(tmp_path, cylinders, star):
     result = solve(engines.problem(tmp_path, cylinders, "four-stroke"))
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value == 0.0
-    found = degrees(result.phasing.ranking[0])
-    assert found in (star, [(360 - angle) % 360 for angle in star])
+    actual = degrees(result.phasing.ranking[0])
+    assert actual in (star, [(360 - angle) % 360 for angle in star])
 
 
 def test_cross_plane_eight():
@@ -124,7 +124,7 @@ def test_least_couples_of_in_line_engines(cycle, cylinders):
     steps = firing_lattice(cycle, cylinders).steps
     space = StarSpace(steps, even_patterns(cycle, layout), layout.throw_positions)
     objective = AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),))
-    found = enumerate_stars(
+    result = enumerate_stars(
         StarSpace(steps, space.patterns, space.places, mirror=True, reflect=True), objective, 1
     )  # fmt: skip
     minimum = math.inf
@@ -133,8 +133,8 @@ def test_least_couples_of_in_line_engines(cycle, cylinders):
     for block in whole.blocks():
         couples = np.abs(star_sums(block, steps, layout.throw_positions, (1, 2))[..., 1])
         minimum = min(minimum, float(np.sqrt(couples[:, 0] ** 2 + (0.25 * couples[:, 1]) ** 2).min()))
-    assert found.complete
-    assert found.values[0] == pytest.approx(minimum, rel=1e-9, abs=1e-9)
+    assert result.complete
+    assert result.values[0] == pytest.approx(minimum, rel=1e-9, abs=1e-9)
 
 
 def test_published_couples():

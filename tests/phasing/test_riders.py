@@ -58,14 +58,14 @@ def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[flo
         for d in given.decisions
     ))  # fmt: skip
     riders = Riders(given, rotor_throws_of(phasing, candidate), throws)
-    found = riders.columns(np.array(throws), np.array(throws))
+    result = riders.columns(np.array(throws), np.array(throws))
     rng = np.random.default_rng(5)
     names = [decision.name for decision in given.unbalances]
     assert len(names) == 4
     still = names[:1]
     assert still[0].startswith("still")
     for _ in range(4):
-        values, y, first = [], np.zeros(found.matrix.shape[1]), 0
+        values, y, first = [], np.zeros(result.matrix.shape[1]), 0
         for decision in given.unbalances:
             own_set = decision.set
             if own_set.width == 2:
@@ -79,10 +79,10 @@ def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[flo
             y[first : first + len(parts)] = parts
             first += len(parts)
             values.append(value)
-        for domain in found.domains:
+        for domain in result.domains:
             # inside the set of every column
             assert y[domain.columns] == pytest.approx(domain.project(y), abs=1e-15)
-        x = found.matrix @ y
+        x = result.matrix @ y
         unbalance_values = [domain.complex_value(x) for domain in domains_of(riders.problem.unbalances)]
         expected = unbalances(given.design(values))
         assert np.abs(expected).max() > 0.0

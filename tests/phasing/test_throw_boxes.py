@@ -174,8 +174,8 @@ def test_waves_add_up_to_the_exact_loads(tmp_path, name):
                 [d.set.lower * d.set.directions[0] if d.set.width == 1 else 0.0 for d in given.unbalances]
             )
         value = evaluate(given, design, 6000).value(measure)
-        found = norm.fixed.norm.value(norm.fixed.grid, rows)
-        assert abs(found - value) <= 2e-4 * value + norm.left_out
+        result = norm.fixed.norm.value(norm.fixed.grid, rows)
+        assert abs(result - value) <= 2e-4 * value + norm.left_out
 
 
 @pytest.mark.parametrize(("layout", "cycle", "count"), [("inline", "two-stroke", 4), ("inline", "four-stroke", 4),

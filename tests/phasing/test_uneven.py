@@ -101,11 +101,11 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
     start = Candidate(throws, order)
     problem = phasing.problem_of(start)
     given = evaluate(problem).value(problem.objective[0].measure)
-    found = local_optimum(phasing, start, phasing.intervals)
-    assert found.value <= given
-    assert found.has_moved_throws
-    assert found.kkt_residual < 1e-6
-    assert phasing.intervals.holds(found.result.final.engine.firing_intervals)
+    actual = local_optimum(phasing, start, phasing.intervals)
+    assert actual.value <= given
+    assert actual.has_moved_throws
+    assert actual.kkt_residual < 1e-6
+    assert phasing.intervals.holds(actual.result.final.engine.firing_intervals)
     still = local_optimum(phasing, start, Intervals(phasing.even_interval, phasing.even_interval))
     assert still.value == pytest.approx(given, rel=1e-12)
 
@@ -139,9 +139,9 @@ def test_a_start_that_fires_too_unevenly_leads_to_a_crank_that_does_not(tmp_path
         Candidate(tuple(math.radians(a) for a in throws), (1, 3, 2)) for throws in ((0, 120, 240), (0, 100, 220))
     )
     assert not phasing.intervals.holds(phasing.problem_of(bent).engine.firing_intervals)
-    found = local_optimum(phasing, bent, phasing.intervals, with_perturbations=False)
-    assert phasing.intervals.holds(found.result.final.engine.firing_intervals, 1e-7)
-    assert found.value <= solve(replace(phasing.problem_of(even), phasing=None)).objective.value * (1.0 + 1e-6)
+    actual = local_optimum(phasing, bent, phasing.intervals, with_perturbations=False)
+    assert phasing.intervals.holds(actual.result.final.engine.firing_intervals, 1e-7)
+    assert actual.value <= solve(replace(phasing.problem_of(even), phasing=None)).objective.value * (1.0 + 1e-6)
 
 
 MODELS = {

@@ -80,8 +80,8 @@ def test_every_order_is_that_of_the_exact_model(tmp_path, name, monkeypatch):
         assert max(abs(smooth[h]).max() for h in smooth if h not in (0.0, 1.0, 2.0)) > 10.0
         peak = np.abs(wrench.sample(480)).max(axis=0)
         for h in wrench.orders:
-            found = smooth.get(float(h), np.zeros((6, 2)))
-            assert np.abs(found[:, 0] + 1j * found[:, 1] - wrench.at(h)).max() <= 1e-9 * peak.max()
+            result = smooth.get(float(h), np.zeros((6, 2)))
+            assert np.abs(result[:, 0] + 1j * result[:, 1] - wrench.at(h)).max() <= 1e-9 * peak.max()
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -192,20 +192,20 @@ def test_even_firing_stays_where_it_is_best(tmp_path, orders, stays):
     start = Candidate(tuple(math.tau * t / 3.0 for t in (0, 1, 2)), (1, 3, 2))
     given = light.problem_of(start)
     even = objective_value(given, evaluate(given))
-    found = local_optimum(light, start, phasing.intervals)
+    result = local_optimum(light, start, phasing.intervals)
     if stays:
-        assert not found.has_moved_throws
-        assert found.candidate.throws == start.throws
-        assert found.value < 1e-6
+        assert not result.has_moved_throws
+        assert result.candidate.throws == start.throws
+        assert result.value < 1e-6
         return
-    assert found.has_moved_throws
-    assert found.value < even * (1.0 - 1e-3)
+    assert result.has_moved_throws
+    assert result.value < even * (1.0 - 1e-3)
     rng = np.random.default_rng(7)
     for _ in range(20):
-        throws = tuple(a + rng.uniform(-0.2, 0.2) * (k > 0) for k, a in enumerate(found.candidate.throws))
-        near = light.problem_of(replace(found.candidate, throws=throws))
+        throws = tuple(a + rng.uniform(-0.2, 0.2) * (k > 0) for k, a in enumerate(result.candidate.throws))
+        near = light.problem_of(replace(result.candidate, throws=throws))
         if phasing.intervals.holds(near.engine.firing_intervals):
-            assert objective_value(near, evaluate(near)) > found.value * (1.0 - 2e-4)
+            assert objective_value(near, evaluate(near)) > result.value * (1.0 - 2e-4)
 
 
 def _light(problem):

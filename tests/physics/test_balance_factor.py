@@ -35,15 +35,15 @@ def engine(text: str, *weights: str) -> Engine:
 
 @pytest.mark.parametrize(("text", "throws"), [(SINGLE, 1), (THREE, 3), (VEE, 2)])
 def test_it_is_what_the_key_of_that_name_makes(text: str, throws: int) -> None:
-    found = balance_factors(engine(text, 'name = "web"\nbalance_factor = 0.37'))
-    assert len(found) == throws
-    assert [one.factor for one in found] == pytest.approx([0.37] * throws, rel=1e-12)
+    result = balance_factors(engine(text, 'name = "web"\nbalance_factor = 0.37'))
+    assert len(result) == throws
+    assert [one.factor for one in result] == pytest.approx([0.37] * throws, rel=1e-12)
 
 
 def test_a_workshop_counts_the_same() -> None:
     """1.3 kg at 50 mm on a throw of 45 mm: (65 - 0.4 45) / (0.6 45), in kg mm."""
-    found = balance_factors(engine(SINGLE, 'name = "web"\nopposite_throw = 1\nmass = "1.3 kg"\nradius = "50 mm"'))
-    assert [one.factor for one in found] == pytest.approx([(65.0 - 18.0) / 27.0], rel=1e-12)
+    result = balance_factors(engine(SINGLE, 'name = "web"\nopposite_throw = 1\nmass = "1.3 kg"\nradius = "50 mm"'))
+    assert [one.factor for one in result] == pytest.approx([(65.0 - 18.0) / 27.0], rel=1e-12)
 
 
 def test_a_weight_of_nothing_is_none() -> None:
@@ -57,8 +57,8 @@ def test_only_what_stands_opposite_counts() -> None:
 
 
 def test_weights_between_throws_are_shared_and_others_have_none() -> None:
-    found = balance_factors(engine(THREE, 'name = "web"\nx = "50 mm"\nunbalance = "0.02 kg m"\nangle = 180'))
-    assert [one.cylinders for one in found] == [("cylinder 1",), ("cylinder 2",)]
+    result = balance_factors(engine(THREE, 'name = "web"\nx = "50 mm"\nunbalance = "0.02 kg m"\nangle = 180'))
+    assert [one.cylinders for one in result] == [("cylinder 1",), ("cylinder 2",)]
     assert balance_factors(engine(THREE)) == ()
 
 

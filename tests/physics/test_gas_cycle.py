@@ -156,11 +156,11 @@ class TestSeiliger:
         minimum, maximum = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, ratio)
         assert minimum < maximum
         gas = replace(gas, imep=minimum + share * (maximum - minimum))
-        found = seiliger_cut_off(gas, cycle)
-        assert 1.0 <= found <= ratio
+        result = seiliger_cut_off(gas, cycle)
+        assert 1.0 <= result <= ratio
         # volumes are in displacements: at a ratio near 1 the clearance is many of them
         terms = gas.peak_pressure * ratio / (ratio - 1.0)
-        assert abs(seiliger_imep(gas, cycle, found) - gas.imep) <= 1e-13 * terms
+        assert abs(seiliger_imep(gas, cycle, result) - gas.imep) <= 1e-13 * terms
 
     @every_part
     @every_cycle
@@ -190,19 +190,19 @@ class TestSeiliger:
         gas = replace(DIESEL, intake_pressure=1.5 * BAR, exhaust_pressure=1.2 * BAR)
         part, clearance = PARTS["offset"], 1.0 / 16.0
         angles = np.radians([100.0, 200.0, 350.0, 380.0, 520.0, 600.0])
-        found = seiliger_pressure(gas, part, Cycle.FOUR_STROKE, angles)
+        result = seiliger_pressure(gas, part, Cycle.FOUR_STROKE, angles)
         expansion, compression = clearance + _volume(part, angles[[0, 5]])
         knee = clearance * seiliger_cut_off(gas, Cycle.FOUR_STROKE)
-        assert found[0] == pytest.approx(gas.peak_pressure * (knee / expansion) ** 1.30, rel=1e-12)
-        assert found[1:5].tolist() == [1.2 * BAR, 1.2 * BAR, 1.5 * BAR, 1.5 * BAR]
-        assert found[5] == pytest.approx(1.5 * BAR * ((1 + clearance) / compression) ** 1.35, rel=1e-12)
+        assert result[0] == pytest.approx(gas.peak_pressure * (knee / expansion) ** 1.30, rel=1e-12)
+        assert result[1:5].tolist() == [1.2 * BAR, 1.2 * BAR, 1.5 * BAR, 1.5 * BAR]
+        assert result[5] == pytest.approx(1.5 * BAR * ((1 + clearance) / compression) ** 1.35, rel=1e-12)
 
     def test_two_stroke_cycle_has_no_gas_exchange_strokes(self) -> None:
         part = PARTS["plain"]
-        found = seiliger_pressure(DIESEL, part, Cycle.TWO_STROKE, np.radians([179.0, 181.0, 300.0]))
-        assert found[0] > 2 * BAR
-        assert found[1] == pytest.approx(DIESEL.intake_pressure, rel=1e-3)
-        assert found[2] > 1.5 * DIESEL.intake_pressure
+        result = seiliger_pressure(DIESEL, part, Cycle.TWO_STROKE, np.radians([179.0, 181.0, 300.0]))
+        assert result[0] > 2 * BAR
+        assert result[1] == pytest.approx(DIESEL.intake_pressure, rel=1e-3)
+        assert result[2] > 1.5 * DIESEL.intake_pressure
         other = replace(DIESEL, exhaust_pressure=3 * BAR)
         np.testing.assert_array_equal(
             cylinder_pressure(other, part, Cycle.TWO_STROKE, 360),
@@ -234,18 +234,18 @@ class TestSeiliger:
     def test_full_cut_off_keeps_the_peak_down_the_whole_stroke(self, cycle: Cycle) -> None:
         gas = replace(DIESEL, imep=seiliger_imep(DIESEL, cycle, 17.0))
         assert seiliger_cut_off(gas, cycle) == 17.0
-        found = seiliger_pressure(gas, PARTS["plain"], cycle, np.linspace(0.01, 3.14, 50))
-        assert (found == gas.peak_pressure).all()
+        result = seiliger_pressure(gas, PARTS["plain"], cycle, np.linspace(0.01, 3.14, 50))
+        assert (result == gas.peak_pressure).all()
 
 
 class TestJumps:
     def test_a_sample_on_a_jump_takes_the_mean_of_both_sides(self) -> None:
         gas = replace(DIESEL, exhaust_pressure=1.4 * BAR)
-        found = cylinder_pressure(gas, PARTS["plain"], Cycle.FOUR_STROKE, 720)
-        assert found[0] == pytest.approx(0.5 * (compression_end_pressure(gas) + gas.peak_pressure), rel=1e-12)
-        assert found[360] == pytest.approx(0.5 * (gas.exhaust_pressure + gas.intake_pressure), rel=1e-12)
+        result = cylinder_pressure(gas, PARTS["plain"], Cycle.FOUR_STROKE, 720)
+        assert result[0] == pytest.approx(0.5 * (compression_end_pressure(gas) + gas.peak_pressure), rel=1e-12)
+        assert result[360] == pytest.approx(0.5 * (gas.exhaust_pressure + gas.intake_pressure), rel=1e-12)
         before = seiliger_pressure(gas, PARTS["plain"], Cycle.FOUR_STROKE, np.array([math.pi - 1e-6]))
-        assert found[180] == pytest.approx(0.5 * (before[0] + gas.exhaust_pressure), rel=1e-6)
+        assert result[180] == pytest.approx(0.5 * (before[0] + gas.exhaust_pressure), rel=1e-6)
         assert before[0] > 2 * BAR
 
     @every_part
@@ -312,8 +312,8 @@ class TestWiebe:
     def test_against_integration(self, gas: Wiebe, part: SliderCrank) -> None:
         angles = np.linspace(-2.8, 2.8, 117)
         expected = _integrated(gas, part, wiebe_heat(gas, part, Cycle.TWO_STROKE), angles)
-        found = wiebe_pressure(gas, part, Cycle.TWO_STROKE, angles)
-        np.testing.assert_allclose(found, expected, rtol=1e-9)
+        result = wiebe_pressure(gas, part, Cycle.TWO_STROKE, angles)
+        np.testing.assert_allclose(result, expected, rtol=1e-9)
 
     @every_part
     @every_cycle
@@ -361,8 +361,8 @@ class TestWiebe:
         heat = wiebe_heat(gas, PARTS["plain"], Cycle.TWO_STROKE)
         assert heat == pytest.approx(8 * BAR / (1 - 17.0**-0.35), rel=1e-7)
         end = gas.intake_pressure * 17.0**1.35
-        found = wiebe_pressure(gas, PARTS["plain"], Cycle.TWO_STROKE, np.array([2e-4]))
-        assert found[0] == pytest.approx(end + 0.35 * heat * 16.0, rel=1e-5)
+        result = wiebe_pressure(gas, PARTS["plain"], Cycle.TWO_STROKE, np.array([2e-4]))
+        assert result[0] == pytest.approx(end + 0.35 * heat * 16.0, rel=1e-5)
 
     @every_part
     @every_cycle
@@ -371,8 +371,8 @@ class TestWiebe:
         exchange = gas.intake_pressure - gas.exhaust_pressure if cycle is Cycle.FOUR_STROKE else 0.0
         gas = replace(gas, imep=exchange)
         assert wiebe_heat(gas, part, cycle) == 0.0
-        found = indicated_mean_pressure(cylinder_pressure(gas, part, cycle, 1440), part, cycle)
-        assert found == pytest.approx(exchange, rel=2e-4, abs=1e-9 * BAR)
+        result = indicated_mean_pressure(cylinder_pressure(gas, part, cycle, 1440), part, cycle)
+        assert result == pytest.approx(exchange, rel=2e-4, abs=1e-9 * BAR)
         angles = np.linspace(-2.8, 2.8, 41)
         adiabatic = gas.intake_pressure * (17.0 / (1.0 + 16.0 * _volume(part, angles))) ** 1.35
         np.testing.assert_allclose(wiebe_pressure(gas, part, cycle, angles), adiabatic, rtol=1e-8)
@@ -435,12 +435,12 @@ class TestTrace:
     def test_a_jump_does_not_ring(self) -> None:
         angles = np.radians(np.arange(0.0, 360.0, 2.0))
         pressures = np.where(angles < 1.0, 60 * BAR, BAR)
-        found = cylinder_pressure(
+        result = cylinder_pressure(
             PressureTrace(tuple(angles), tuple(pressures)), PARTS["plain"], Cycle.TWO_STROKE, 5000
         )
         # what a convex combination of two equal numbers may round to
-        assert found.min() > BAR * (1 - 1e-12)
-        assert found.max() < 60 * BAR * (1 + 1e-12)
+        assert result.min() > BAR * (1 - 1e-12)
+        assert result.max() < 60 * BAR * (1 + 1e-12)
 
     @given(seed=st.integers(0, 10_000), points=st.integers(16, 90))
     def test_stays_within_its_neighbours(self, seed: int, points: int) -> None:
@@ -449,11 +449,11 @@ class TestTrace:
         angles = np.cumsum(gaps) * math.tau / gaps.sum() - 2.0
         pressures = random.uniform(1.0, 100.0, points) * BAR
         at = np.linspace(-3.0, 6.0, 801)
-        found = trace_pressure(PressureTrace(tuple(angles), tuple(pressures)), Cycle.TWO_STROKE, at)
+        result = trace_pressure(PressureTrace(tuple(angles), tuple(pressures)), Cycle.TWO_STROKE, at)
         left = np.searchsorted(angles, angles[0] + np.mod(at - angles[0], math.tau), side="right") - 1
         ends = np.stack([pressures[left], pressures[(left + 1) % points]])
-        assert (found >= ends.min(axis=0) * (1 - 1e-9)).all()
-        assert (found <= ends.max(axis=0) * (1 + 1e-9)).all()
+        assert (result >= ends.min(axis=0) * (1 - 1e-9)).all()
+        assert (result <= ends.max(axis=0) * (1 + 1e-9)).all()
 
 
 def _one_line(error: pytest.ExceptionInfo[ModelError], *words: str) -> None:

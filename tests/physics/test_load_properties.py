@@ -176,10 +176,10 @@ class TestSymmetry:
             return replace(part, throw=part.throw + part.shaft.ratio * delta, firing_angle=later)
 
         rotors = tuple(replace(r, unbalance=r.unbalance * cmath.exp(1j * r.shaft.ratio * delta)) for r in engine.rotors)
-        found = loads_of(replace(of_parts(engine, turned), rotors=rotors), GAS)
+        result = loads_of(replace(of_parts(engine, turned), rotors=rotors), GAS)
         before = loads_of(engine, GAS)
         phases = np.exp(1j * delta * before.orders)[:, None]
-        assert_same(found, before.coefficients * phases, 1e-10)
+        assert_same(result, before.coefficients * phases, 1e-10)
 
     @given(scenes(), PLACES, PLACES, PLACES)
     def test_moving_the_engine_adds_r_cross_f(self, scene: Scene, dx: float, dy: float, dz: float) -> None:
@@ -216,9 +216,9 @@ class TestSymmetry:
             rotors=tuple(replace(r, unbalance=r.unbalance.conjugate(), shaft=seen(r.shaft)) for r in engine.rotors),
         )
         signs = np.array([1.0, -1.0, 1.0, 0.0, 1.0, -1.0])
-        found, before = loads_of(mirrored), loads_of(engine).coefficients
-        without_roll = found.coefficients * np.abs(signs)
-        assert_same(Spectrum(found.base, without_roll), before * signs)
+        result, before = loads_of(mirrored), loads_of(engine).coefficients
+        without_roll = result.coefficients * np.abs(signs)
+        assert_same(Spectrum(result.base, without_roll), before * signs)
         assert_same(gas_loads(mirrored, GAS, COARSE), gas_loads(engine, GAS, COARSE).coefficients)
 
     @given(scenes(), st.floats(1e-6, 1e6), st.floats(1e-3, 1e3))

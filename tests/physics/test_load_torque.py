@@ -67,11 +67,11 @@ def test_a_time_integration_has_the_same_irregularity(states: dict[str, Any]) ->
 
     swing = swing_of(engine, at, EXACT)
     speeds = swing.speeds(1.2)
-    found = solve_ivp(
+    result = solve_ivp(
         slope, (0.0, engine.cycle.angle), [speeds[0] ** 2], rtol=1e-8, atol=1e-6, max_step=0.05,
         t_eval=np.linspace(0.0, engine.cycle.angle, 720, endpoint=False),
     )  # fmt: skip
-    integrated = np.sqrt(found.y[0])
+    integrated = np.sqrt(result.y[0])
     assert 1.0 / np.mean(1.0 / integrated) == pytest.approx(at.speed, rel=1e-4)
     degree = np.ptp(integrated) / at.speed
     assert swing.irregularity(1.2) == pytest.approx(degree, rel=1e-3)

@@ -77,14 +77,14 @@ class TestStatics:
     @given(mountings(), WRENCHES)
     def test_equilibrium(self, mounts: tuple[Mount, ...], wrench: NDArray[np.complex128]) -> None:
         """Forces on the mounts and their moments add up to the wrench on the block."""
-        found = resultant(mounts, forces(mounts, wrench))
-        np.testing.assert_allclose(found, wrench, rtol=0.0, atol=1e-9 * (1.0 + np.abs(wrench).max()))
+        result = resultant(mounts, forces(mounts, wrench))
+        np.testing.assert_allclose(result, wrench, rtol=0.0, atol=1e-9 * (1.0 + np.abs(wrench).max()))
 
     @given(mountings(), WRENCHES)
     def test_mounts_give_way_as_one_body_moves(self, mounts: tuple[Mount, ...], wrench: NDArray[np.complex128]) -> None:
         """Check that the mount deflections K^-1 F are those of one rigid body, u + omega x r."""
-        found = forces(mounts, wrench)
-        give = np.concatenate([np.linalg.solve(m.stiffness_matrix, f) for m, f in zip(mounts, found, strict=True)])
+        result = forces(mounts, wrench)
+        give = np.concatenate([np.linalg.solve(m.stiffness_matrix, f) for m, f in zip(mounts, result, strict=True)])
         motions = np.concatenate([np.hstack([np.eye(3), _cross(m.position)]) for m in mounts])
         motion, *_ = np.linalg.lstsq(motions, give, rcond=None)
         np.testing.assert_allclose(motions @ motion, give, rtol=0.0, atol=1e-9 * (1.0 + np.abs(give).max()))
@@ -136,10 +136,10 @@ class TestStatics:
         x, y, z = mounts[0].stiffness
         stiff = (replace(mounts[0], stiffness=(1e9 * x, 1e9 * y, 1e9 * z)), *mounts[1:])
         through = np.concatenate([wrench[:3], np.cross(np.array(mounts[0].position), wrench[:3])])
-        found = forces(stiff, through)
+        result = forces(stiff, through)
         size = 1.0 + float(np.abs(wrench).max())
-        np.testing.assert_allclose(resultant(stiff, found), through, rtol=0.0, atol=1e-9 * size)
-        np.testing.assert_allclose(found[0], wrench[:3], rtol=0.0, atol=1e-6 * size)
+        np.testing.assert_allclose(resultant(stiff, result), through, rtol=0.0, atol=1e-9 * size)
+        np.testing.assert_allclose(result[0], wrench[:3], rtol=0.0, atol=1e-6 * size)
 
 
 def _cross(place: tuple[float, float, float]) -> NDArray[np.float64]:
@@ -161,19 +161,19 @@ class TestTwoMounts:
 
     def test_roll_moment(self) -> None:
         """A b = T: the roll moment lifts one side and presses the other."""
-        found = forces(PAIR, np.array([0.0, 0.0, 0.0, 120.0, 0.0, 0.0], dtype=complex))
-        np.testing.assert_allclose(found, [[0, 0, 120.0 / 0.504], [0, 0, -120.0 / 0.504]], atol=1e-10)
+        result = forces(PAIR, np.array([0.0, 0.0, 0.0, 120.0, 0.0, 0.0], dtype=complex))
+        np.testing.assert_allclose(result, [[0, 0, 120.0 / 0.504], [0, 0, -120.0 / 0.504]], atol=1e-10)
 
     def test_forces_halve(self) -> None:
-        found = forces(PAIR, np.array([0.0, 700.0, -300.0, 0.0, 0.0, 0.0], dtype=complex))
-        np.testing.assert_allclose(found, [[0, 350, -150], [0, 350, -150]], atol=1e-10)
+        result = forces(PAIR, np.array([0.0, 700.0, -300.0, 0.0, 0.0, 0.0], dtype=complex))
+        np.testing.assert_allclose(result, [[0, 350, -150], [0, 350, -150]], atol=1e-10)
 
     def test_mounts_below_the_crank(self) -> None:
         """A lateral force on the crank axis rolls the engine on mounts that lie h below: h F / b up and down."""
         low = [replace(m, position=(0.0, m.position[1], -0.1)) for m in PAIR]
-        found = forces(low, np.array([0.0, 700.0, 0.0, 0.0, 0.0, 0.0], dtype=complex))
+        result = forces(low, np.array([0.0, 700.0, 0.0, 0.0, 0.0, 0.0], dtype=complex))
         lift = 700.0 * 0.1 / 0.504
-        np.testing.assert_allclose(found, [[0, 350, -lift], [0, 350, lift]], atol=1e-10)
+        np.testing.assert_allclose(result, [[0, 350, -lift], [0, 350, lift]], atol=1e-10)
 
 
 FOUR = tuple(Mount(f"{x} {y}", (x, y, 0.0)) for x in (0.4, -0.8) for y in (0.25, -0.25))
@@ -226,9 +226,9 @@ class TestUncarried:
     def test_the_rest_is_carried(self, mounts: Sequence[Mount], carried: Sequence[str]) -> None:
         """Check equilibrium in every carried direction, and zero force where a mount has no stiffness."""
         for component in carried:
-            found = forces(mounts, unit(component))
-            np.testing.assert_allclose(resultant(mounts, found), unit(component), atol=1e-12)
-            for mount, force in zip(mounts, found, strict=True):
+            result = forces(mounts, unit(component))
+            np.testing.assert_allclose(resultant(mounts, result), unit(component), atol=1e-12)
+            for mount, force in zip(mounts, result, strict=True):
                 assert np.abs(force[np.array(mount.stiffness) == 0.0]).max(initial=0.0) < 1e-14
 
     def test_a_force_through_the_only_mount(self) -> None:

@@ -121,8 +121,8 @@ def test_the_low_pass_is_the_smoothing_spline_of_least_cross_validation() -> Non
 def test_noise_is_measured(noise: float) -> None:
     data = 5.0 * np.sin(np.linspace(0.0, math.tau, 7200, endpoint=False))
     data[100] += 50.0
-    found = _noise(data + noise * np.random.default_rng(7).standard_normal(7200))
-    assert found == pytest.approx(noise, rel=0.05)
+    result = _noise(data + noise * np.random.default_rng(7).standard_normal(7200))
+    assert result == pytest.approx(noise, rel=0.05)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.2])

@@ -100,9 +100,9 @@ def test_tangential_force_of_the_table() -> None:
     alpha = np.radians([30.0, 60.0, 90.0, 120.0, 150.0])
     psi = np.arcsin(np.sin(alpha) / 4.5)
     _, (_, velocity, _) = part.motion(np, alpha).points[0]
-    found = np.abs(velocity) / part.crank_radius
-    assert found == pytest.approx(np.sin(alpha + psi) / np.cos(psi), rel=1e-12)
-    assert found[1] == pytest.approx(0.964, abs=5e-4)
+    result = np.abs(velocity) / part.crank_radius
+    assert result == pytest.approx(np.sin(alpha + psi) / np.cos(psi), rel=1e-12)
+    assert result[1] == pytest.approx(0.964, abs=5e-4)
 
 
 def exact(inertia: float) -> Fidelity:
@@ -232,9 +232,9 @@ def test_irregularity_is_that_of_the_motion_in_time() -> None:
     motion = crank_motion(engine, point, fidelity)
     begin = [float(motion.angle[0]), float(motion.speed[0])]
     period = engine.cycle.angle / point.speed
-    found = solve_ivp(rates, (0.0, period), begin, rtol=1e-9, atol=1e-9, t_eval=np.linspace(0.0, period, 400))
-    assert found.y[0, -1] - found.y[0, 0] == pytest.approx(engine.cycle.angle, rel=1e-5)
-    uneven = float(np.ptp(found.y[1])) / point.speed
+    result = solve_ivp(rates, (0.0, period), begin, rtol=1e-9, atol=1e-9, t_eval=np.linspace(0.0, period, 400))
+    assert result.y[0, -1] - result.y[0, 0] == pytest.approx(engine.cycle.angle, rel=1e-5)
+    uneven = float(np.ptp(result.y[1])) / point.speed
     assert torque_facts(engine, point, fidelity).irregularity == pytest.approx(uneven, rel=2e-3)
 
 

@@ -110,10 +110,10 @@ class TestCouplings:
         assert decision.name == "leader.unbalance"
         assert [drive.rotor for drive in decision.drives] == ["leader", "follower.front", "follower.rear"]
         for value in (decision.start, 0j, 0.2 + 0.1j, cmath.rect(1.0, -2.0)):
-            found = unbalances(problem, value)
-            assert found["leader"] == pytest.approx(value)
-            assert found["follower.front"] == pytest.approx(SENSES[how](value))
-            assert found["follower.rear"] == pytest.approx(SENSES[then](SENSES[how](value)))
+            result = unbalances(problem, value)
+            assert result["leader"] == pytest.approx(value)
+            assert result["follower.front"] == pytest.approx(SENSES[how](value))
+            assert result["follower.rear"] == pytest.approx(SENSES[then](SENSES[how](value)))
         by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
         assert all(by_name[name].radius == 0.02 for name in ("leader", "follower.front", "follower.rear"))
 
@@ -130,9 +130,9 @@ class TestCouplings:
         text = text.replace('{ between = ["0 kg m", "1 kg m"], start = "0.3 kg m" }', '"0.3 kg m"')
         problem = problem_of(folder, text.replace("{ between = [0, 360], start = 40 }", "40"))
         assert problem.decisions == ()
-        found = unbalances(problem)
-        assert found["follower.front"] == pytest.approx(cmath.rect(0.3, math.radians(-40)))
-        assert found["follower.rear"] == pytest.approx(-cmath.rect(0.3, math.radians(-40)))
+        result = unbalances(problem)
+        assert result["follower.front"] == pytest.approx(cmath.rect(0.3, math.radians(-40)))
+        assert result["follower.rear"] == pytest.approx(-cmath.rect(0.3, math.radians(-40)))
 
 
 ROD_LENGTH = 0.06 / 0.26
@@ -150,21 +150,21 @@ class TestCounterweights:
         (decision,) = problem.decisions
         assert (decision.name, decision.unit, decision.lower, decision.upper) == ("web.balance_factor", "", -1.0, 2.0)
         for value in (fraction, decision.start):
-            found = unbalances(problem, value)
+            result = unbalances(problem, value)
             for k, throw in enumerate(THROWS):
                 mass = ROTATING + value * 2 * RECIPROCATING
                 expected = -mass * 0.06 * cmath.exp(1j * math.radians(throw))
-                assert found[f"web.{k + 1}"] == pytest.approx(expected)
+                assert result[f"web.{k + 1}"] == pytest.approx(expected)
 
     @pytest.mark.parametrize("fraction", [0.0, 0.5, 1.0])
     def test_a_fixed_fraction_is_no_decision(self, folder: Path, fraction: float) -> None:
         text = f'[[counterweights]]\nname = "web"\nbalance_factor = {fraction}\nthrows = [2]\n'
         problem = problem_of(folder, text)
         assert problem.decisions == ()
-        found = unbalances(problem)
-        assert "web.1" not in found
+        result = unbalances(problem)
+        assert "web.1" not in result
         mass = ROTATING + fraction * 2 * RECIPROCATING
-        assert found["web.2"] == pytest.approx(-mass * 0.06 * cmath.exp(1j * math.radians(135)))
+        assert result["web.2"] == pytest.approx(-mass * 0.06 * cmath.exp(1j * math.radians(135)))
 
     def test_rotating_masses_balanced(self, folder: Path) -> None:
         """Check that a balance factor of zero leaves no rotating load."""
@@ -190,9 +190,9 @@ class TestCounterweights:
         """
         problem = problem_of(folder, text)
         assert [(d.name, d.unit) for d in problem.decisions] == [("web.mass", "kg"), ("disc.unbalance", "kg m")]
-        found = unbalances(problem, value, value)
-        assert found["web"] == pytest.approx(0.08 * value * cmath.exp(1j * math.radians(135 + 180)))
-        assert found["disc"] == pytest.approx(value)
+        result = unbalances(problem, value, value)
+        assert result["web"] == pytest.approx(0.08 * value * cmath.exp(1j * math.radians(135 + 180)))
+        assert result["disc"] == pytest.approx(value)
         by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
         assert (by_name["web"].x, by_name["disc"].x) == pytest.approx((-0.0625, 0.2))
 

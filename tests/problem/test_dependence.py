@@ -80,8 +80,8 @@ def _random(problem: Problem, rng: np.random.Generator) -> Problem:
     rotors = tuple(replace(r, unbalance=r.unbalance * complex(*rng.uniform(0.5, 1.5, 2))) for r in engine.rotors)
     points = tuple(replace(point, speed=point.speed * float(rng.uniform(0.7, 1.1))) for point in problem.points)
     fidelity = replace(problem.fidelity, samples=360)
-    found = replace(problem, engine=replace(engine, rotors=rotors), points=points, fidelity=fidelity)
-    return replace(found, ranks=(), extras=())
+    result = replace(problem, engine=replace(engine, rotors=rotors), points=points, fidelity=fidelity)
+    return replace(result, ranks=(), extras=())
 
 
 def _values(decision: Decision, shares: np.ndarray) -> complex | float:
@@ -112,13 +112,13 @@ def _sampled(problem: Problem, kind: Kind, rng: np.random.Generator) -> tuple[Pr
     own = tuple(decision for decision in problem.decisions if decision.kind is kind)
     held = [d for d in problem.decisions if d.kind is not kind]
     middle = [_values(d, rng.uniform(0.2, 0.8, 2)) for d in held]
-    found = replace(problem, engine=problem.design(middle, held), decisions=own)
+    result = replace(problem, engine=problem.design(middle, held), decisions=own)
     # along one number: two of a kind may be multiplied by each other
     chosen = int(rng.integers(len(own))) if kind not in (Kind.UNBALANCE, Kind.SHARE, Kind.PISTON) else None
     base, step = rng.uniform(0.15, 0.4, (len(own), 2)), rng.uniform(0.1, 0.2, (len(own), 2))
     step = step if chosen is None else np.where(np.arange(len(own))[:, None] == chosen, step, 0.0)
     designs = [[_values(d, b + k * s) for d, b, s in zip(own, base, step, strict=True)] for k in range(3)]
-    return found, [evaluate(found, found.design(design)) for design in designs]
+    return result, [evaluate(result, result.design(design)) for design in designs]
 
 
 def refuted(claim: Dependence, at: Sequence[np.ndarray]) -> bool:

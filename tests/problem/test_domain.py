@@ -68,8 +68,8 @@ class TestLeast:
         gradient = vector(d, factors)
         if float(np.hypot.reduce(gradient[d.columns])) < 1e-3:
             return
-        found = d.project(-1e9 * gradient)
-        assert float(found @ gradient[d.columns]) == pytest.approx(d.minimum(gradient), abs=1e-6 * (1.0 + d.scale))
+        result = d.project(-1e9 * gradient)
+        assert float(result @ gradient[d.columns]) == pytest.approx(d.minimum(gradient), abs=1e-6 * (1.0 + d.scale))
 
 
 class TestProject:
@@ -84,12 +84,12 @@ class TestProject:
     def test_nearest(self, d: Domain, factors: tuple[float, float]) -> None:
         """In the set, and no point of a grid over it is nearer."""
         x = vector(d, tuple(3.0 * f for f in factors))
-        found = d.project(x)
-        distance = float(np.hypot.reduce(found - x[d.columns]))
+        result = d.project(x)
+        distance = float(np.hypot.reduce(result - x[d.columns]))
         to_grid = np.sqrt(((points(d) - x[d.columns]) ** 2).sum(axis=1))
         assert distance <= float(to_grid.min()) + 1e-12
-        assert float(np.sqrt(((points(d) - found) ** 2).sum(axis=1)).min()) <= 0.15 * d.scale
-        self._assert_inside(d, found)
+        assert float(np.sqrt(((points(d) - result) ** 2).sum(axis=1)).min()) <= 0.15 * d.scale
+        self._assert_inside(d, result)
 
     @staticmethod
     def _assert_inside(d: Domain, found: Array) -> None:
@@ -124,10 +124,10 @@ class TestColumns:
     def test_side_by_side(self) -> None:
         """Check one column with the angle fixed, two with it open, and none shared."""
         kinds = [domain(0.0, 1.0, 0.3, 0.3), domain(0.0, 1.0, 0.0, 1.0), domain(-1.0, 0.5, 0.0, 0.0)]
-        found = domains_of(tuple(d.decision for d in kinds))
-        assert [(d.start, d.width) for d in found] == [(0, 1), (1, 2), (3, 1)]
-        assert [d.columns for d in found] == [slice(0, 1), slice(1, 3), slice(3, 4)]
-        assert [d.scale for d in found] == [1.0, 1.0, 1.0]
+        result = domains_of(tuple(d.decision for d in kinds))
+        assert [(d.start, d.width) for d in result] == [(0, 1), (1, 2), (3, 1)]
+        assert [d.columns for d in result] == [slice(0, 1), slice(1, 3), slice(3, 4)]
+        assert [d.scale for d in result] == [1.0, 1.0, 1.0]
 
     def test_a_decision_of_no_size_has_a_scale(self) -> None:
         assert domain(0.0, 0.0, 0.0, math.tau).scale == 1.0

@@ -84,6 +84,6 @@ def test_a_norm_is_never_under_the_largest_singular_value(shape: tuple[int, int]
     matrices[0] = 0.0
     matrices[1] *= 1e-150
     exact = np.linalg.norm(matrices, ord=2, axis=(-2, -1))
-    found = norm_over(matrices)
-    assert np.all(found >= exact * (1.0 - 1e-12))
-    assert np.all(found <= exact * min(shape) ** (1.0 / 16.0) * (1.0 + 1e-12))
+    result = norm_over(matrices)
+    assert np.all(result >= exact * (1.0 - 1e-12))
+    assert np.all(result <= exact * min(shape) ** (1.0 / 16.0) * (1.0 + 1e-12))

@@ -90,10 +90,10 @@ def test_named_places_are_middles_of_the_least_boxes() -> None:
             nearest = np.clip(place, lower, upper)
             return 1.0 + np.square(nearest - place).sum(axis=1), np.argmax(upper - lower, axis=1)
 
-    found = bisect_box(Distance(), np.array([1.0, 5.0]), np.array([4.0, 9.0]), 1.05, 0.0, 60)
-    assert found.bound == 1.0
-    assert found.places
-    for middle in found.places:
+    result = bisect_box(Distance(), np.array([1.0, 5.0]), np.array([4.0, 9.0]), 1.05, 0.0, 60)
+    assert result.bound == 1.0
+    assert result.places
+    for middle in result.places:
         assert np.abs(middle - place).max() < 1.5
 
 
@@ -128,14 +128,14 @@ class Bowl:
     def bounds(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         nearest = np.clip(self.centre, lower, upper)
         # half of it is left open, so that boxes are divided
-        found = np.abs(nearest - self.centre).sum(axis=1) - 0.5 * (upper - lower).sum(axis=1)
-        return found, np.argmax(upper - lower, axis=1)
+        result = np.abs(nearest - self.centre).sum(axis=1) - 0.5 * (upper - lower).sum(axis=1)
+        return result, np.argmax(upper - lower, axis=1)
 
 
 def test_boxes_are_halved_until_none_is_better_by_the_room() -> None:
     centre = np.array([0.3, 0.7])
-    found = bisect_box(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20_000)
-    assert -1e-2 <= found.bound <= 0.0
+    result = bisect_box(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20_000)
+    assert -1e-2 <= result.bound <= 0.0
     few = bisect_box(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20)
     assert few.bound < -1e-2
     assert len(few.places) == 3

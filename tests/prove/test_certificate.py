@@ -109,9 +109,9 @@ def random_multipliers(rng: np.random.Generator, problem: AffineProblem, x: Arra
 
 class TestGap:
     def test_is_a_share_of_the_value(self) -> None:
-        found = make_certificate(2.0, 1.5, 1e-9, 1e-4, ProofStrength.EXACT, 0.0, "")
-        assert found.gap == pytest.approx(0.25)
-        assert found.kind is Proof.WITHIN_GAP
+        result = make_certificate(2.0, 1.5, 1e-9, 1e-4, ProofStrength.EXACT, 0.0, "")
+        assert result.gap == pytest.approx(0.25)
+        assert result.kind is Proof.WITHIN_GAP
 
     @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
     def test_is_the_same_share_in_every_unit(self, unit: float) -> None:
@@ -124,9 +124,9 @@ class TestGap:
 
     def test_a_difference_that_counts_as_zero_is_stated(self) -> None:
         """It proves the optimum; a reader still sees that value and bound differ."""
-        found = make_certificate(1e-6, 0.9999e-6, 1e-9, 1e-6, ProofStrength.RELAXED, 0.0, "")
-        assert found.kind is Proof.GLOBAL
-        assert found.gap == pytest.approx(1e-4)
+        result = make_certificate(1e-6, 0.9999e-6, 1e-9, 1e-6, ProofStrength.RELAXED, 0.0, "")
+        assert result.kind is Proof.GLOBAL
+        assert result.gap == pytest.approx(1e-4)
 
     def test_nothing_is_a_rounding_of_the_parts_and_not_of_the_sum(self, tmp_path: Path) -> None:
         """A balanced six has the parts of a single cylinder six times; soft mounts have no resonance of their own."""
@@ -224,8 +224,8 @@ class TestBound:
             turns = np.exp(2j * np.pi * np.outer(np.arange(count), np.arange(3)) / count)
             rows = np.einsum("sh,ghdn->gsdn", turns, waves).real.reshape(groups * count, 2, size + 1)
             weights = np.full(groups * count, 1.0 / (groups * count))
-            found = AffineNorm(norm, rows[..., 0], rows[..., 1:], Grid(weights, count))
-            return AffineProblem(((1.0, found),), (), domains, count)
+            result = AffineNorm(norm, rows[..., 0], rows[..., 1:], Grid(weights, count))
+            return AffineProblem(((1.0, result),), (), domains, count)
 
         coarse, fine = at(samples), at(2 * samples)
         x = random_point(rng, coarse)

@@ -29,11 +29,11 @@ def test_the_least_excess_is_never_over_that_of_a_linear_program() -> None:
             [*np.zeros(n), 1.0], A_ub=np.column_stack([by, -np.ones(count)]), b_ub=-overs,
             bounds=[(-1.0, 1.0)] * n + [(None, None)],
         ).fun  # fmt: skip
-        found = float(lines.violation[0])
-        assert found <= exact + 1e-9
+        result = float(lines.violation[0])
+        assert result <= exact + 1e-9
         if count <= 2:
-            assert found == pytest.approx(exact, abs=1e-9)
-        tight.append(found >= exact - 1e-6)
+            assert result == pytest.approx(exact, abs=1e-9)
+        tight.append(result >= exact - 1e-6)
     assert np.mean(tight) > 0.8
 
 

@@ -50,9 +50,9 @@ def test_each_has_its_turn_until_one_closes(
     never = Prover("never", lambda _: False, bounds_of("n", [(1.0, 1)]).bounds)
     monkeypatch.setattr(provers, "provers", lambda: (never, bounds_of("f", first), bounds_of("s", second)))
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
-    found = run_provers(Question(problem, 1.0, 0.1))
-    assert (found.bound, found.boxes, "".join(name for name, _ in calls)) == (bound, boxes, order)
-    assert bool(found.places) is bool(order)
+    result = run_provers(Question(problem, 1.0, 0.1))
+    assert (result.bound, result.boxes, "".join(name for name, _ in calls)) == (bound, boxes, order)
+    assert bool(result.places) is bool(order)
     # each knows the best bound before its own
     known_bounds = [0.0, *(answer[0] for answer in (first + second))]
     assert all(known in known_bounds for _, known in calls)

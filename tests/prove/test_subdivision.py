@@ -121,9 +121,9 @@ def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     for share in (1e-2, 1e-3):
         low, high = centre * (1.0 - share), centre * (1.0 + share)
         at = search.model.expanded(lines, low[None], high[None])
-        found = lower_bound_of_norm(search.model, measure, lines, at)
-        assert float(found.value[0]) == pytest.approx(value, abs=float(found.remainder[0]))
-        lacking.append(float(found.remainder[0]) / value)
+        result = lower_bound_of_norm(search.model, measure, lines, at)
+        assert float(result.value[0]) == pytest.approx(value, abs=float(result.remainder[0]))
+        lacking.append(float(result.remainder[0]) / value)
     assert lacking[1] < 1.1e-2 * lacking[0]
 
 
@@ -148,9 +148,9 @@ def test_no_response_that_is_linear_in_a_box_is_under_the_bound_of_its_norm(norm
         value, slopes = (r.normal(size=(5, k, *more, 2 * count)).view(np.complex128) for more in ((), (2,)))
         slopes = size * slopes
         left_out = LinearResponse(value, slopes, np.zeros((5, k)), np.zeros((5, k, 2)))
-        found = norm_under(problem, measure, left_out, lines)
+        result = norm_under(problem, measure, left_out, lines)
         for s in np.vstack([np.zeros(2), r.uniform(-1.0, 1.0, (6, 2)), r.choice([-1.0, 1.0], (4, 2))]):
-            minorants = found.value - found.remainder + found.slopes @ s
+            minorants = result.value - result.remainder + result.slopes @ s
             amplitudes = value + np.einsum("n,bknr->bkr", s, slopes)
             signal = np.einsum("bkr,kt->btr", amplitudes, np.exp(1j * np.outer(lines.orders, angles))).real
             for own, at_box in zip(minorants, signal, strict=True):
@@ -167,10 +167,10 @@ def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
     problem = stiffness_problem(tmp_path, 'minimise = "static sag"')
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     low, high = boxes(problem, 40, 5)
-    found = sag_under(search.model, measure, low, high)
-    assert found.value == pytest.approx(sag(search.model, 0.5 * (low + high)), rel=1e-12)
+    result = sag_under(search.model, measure, low, high)
+    assert result.value == pytest.approx(sag(search.model, 0.5 * (low + high)), rel=1e-12)
     for share in np.random.default_rng(6).random((20, low.shape[1])):
-        line = found.value + found.slopes @ (2.0 * share - 1.0)
+        line = result.value + result.slopes @ (2.0 * share - 1.0)
         assert np.all(line <= sag(search.model, low + share * (high - low)) * (1.0 + 1e-12))
 
 
@@ -180,11 +180,11 @@ def test_a_box_whose_softest_corner_carries_nothing_has_a_line_under_its_sag(tmp
     problem = stiffness_problem(tmp_path, 'minimise = "static sag"', mounts=bottomless)
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     high = np.array([search.model.upper, 0.0 * search.model.upper])
-    found = sag_under(search.model, measure, 0.0 * high, high)
-    assert found.minimum[1] == 0.0
+    result = sag_under(search.model, measure, 0.0 * high, high)
+    assert result.minimum[1] == 0.0
     shares = np.random.default_rng(6).uniform(1e-3, 1.0, (200, high.shape[1]))
     values = sag(search.model, shares * high[0])
-    lines = found.value[0] + (2.0 * shares - 1.0) @ found.slopes[0]
+    lines = result.value[0] + (2.0 * shares - 1.0) @ result.slopes[0]
     assert np.all(lines <= values * (1.0 + 1e-12))
     assert np.max(lines / values) > 0.9
 
@@ -337,9 +337,9 @@ def test_the_number_of_boxes_can_be_chosen(tmp_path: Path) -> None:
     value = 1.17
     assert divided_bound(none, value, 1e-4).boxes == 0
     assert divided_bound(none, value, 1e-4).bound == 0.0
-    found = divided_bound(few, value, 1e-4)
-    assert 40 <= found.boxes < 40 + 2 * 64
-    assert 0.0 <= found.bound < 1.16
+    result = divided_bound(few, value, 1e-4)
+    assert 40 <= result.boxes < 40 + 2 * 64
+    assert 0.0 <= result.bound < 1.16
     with pytest.raises(InputError, match=r"search\.boxes"):
         problem_of(tmp_path, *parts, "[search]\nboxes = -1")
 
@@ -366,10 +366,10 @@ def test_prices_of_limits_are_never_over_what_a_box_has() -> None:
         boxes = LinearRelaxation(
             np.array([value]), slopes[None], [(overs[k : k + 1], by[k : k + 1]) for k in range(limits)]
         )
-        found = float(boxes.minimum[0])
+        result = float(boxes.minimum[0])
         exact = linprog(slopes, A_ub=by, b_ub=-overs, bounds=[(-1.0, 1.0)] * n)
         if exact.status == 2:
             continue
-        assert found <= max(value + exact.fun, 0.0) + 1e-9
-        tight.append(found >= value + exact.fun - 1e-6)
+        assert result <= max(value + exact.fun, 0.0) + 1e-9
+        tight.append(result >= value + exact.fun - 1e-6)
     assert np.mean(tight) > 0.6

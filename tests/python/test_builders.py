@@ -139,9 +139,9 @@ def same(problem: Problem, other: Problem) -> None:
 @pytest.mark.parametrize("name", first_fast(READY, 5, 24))
 def test_a_ready_problem_in_code_is_that_of_its_file(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(PROBLEMS)
-    found = problem_tables(name)
-    read = laufruhe.load(found)
-    for source in (rewritten(found, in_degrees), rewritten(found, in_si)):
+    result = problem_tables(name)
+    read = laufruhe.load(result)
+    for source in (rewritten(result, in_degrees), rewritten(result, in_si)):
         made = in_code(source)
         same(made, read)
         same(laufruhe.load(made.to_toml()), read)

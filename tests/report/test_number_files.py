@@ -160,33 +160,33 @@ def test_points_of_one_name_have_a_column_each() -> None:
 @pytest.mark.slow
 def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) -> None:
     result = evaluate_only(load(PROBLEMS / "study-soft-mounts.toml"))
-    found, block = number_tables(result), result.final.engine.block
+    actual, block = number_tables(result), result.final.engine.block
     assert block is not None
-    rows = [dict(zip(found["mounts"].head, row, strict=True)) for row in found["mounts"].rows]
+    rows = [dict(zip(actual["mounts"].head, row, strict=True)) for row in actual["mounts"].rows]
     # the springs carry the weight, and the block sags on them without tilt
     assert sum(row["stiffness z [N/mm]"] * row["sag [mm]"] for row in rows) == pytest.approx(9.80665 * block.mass)
-    (mounting,) = found["mounting"].rows
+    (mounting,) = actual["mounting"].rows
     assert mounting[1] == pytest.approx(rows[0]["sag [mm]"])
-    assert {"modes", "transmissibility", "forces"} <= set(found)
-    assert any(head.startswith("travel at front left") for head in found["forces"].head)
-    assert len(found["modes"].rows) == 6
-    criticals = found["mount-critical-speeds"]
+    assert {"modes", "transmissibility", "forces"} <= set(actual)
+    assert any(head.startswith("travel at front left") for head in actual["forces"].head)
+    assert len(actual["modes"].rows) == 6
+    criticals = actual["mount-critical-speeds"]
     # an order meets a frequency where it shakes as often
     assert all(row[6] / 60.0 * row[5] == pytest.approx(row[3]) for row in criticals.rows)
 
 
 @pytest.mark.slow
 def test_ranked_stars_are_a_sheet() -> None:
-    found = number_tables(solved("inline-five-open"))
-    assert found["rankings"].rows[0][0] == 1
-    assert found["rankings"].rows[0][3] is True
+    result = number_tables(solved("inline-five-open"))
+    assert result["rankings"].rows[0][0] == 1
+    assert result["rankings"].rows[0][3] is True
     # an even five-cylinder star has no free force of any order shown
-    forces = [k for k, head in enumerate(found["rankings"].head) if head.startswith("free force of order")]
+    forces = [k for k, head in enumerate(result["rankings"].head) if head.startswith("free force of order")]
     assert forces
-    assert all(abs(found["rankings"].rows[0][k]) < 1e-12 for k in forces)
+    assert all(abs(result["rankings"].rows[0][k]) < 1e-12 for k in forces)
     # no throw may leave its step, so that nothing is known of what that buys
-    assert "uneven-firing" not in found
-    assert all(sheet.rows for sheet in found.values())
+    assert "uneven-firing" not in result
+    assert all(sheet.rows for sheet in result.values())
 
 
 def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
@@ -218,9 +218,9 @@ def test_names_are_known_before_anything_is_made(result: Result) -> None:
 
 
 def test_a_file_is_named_after_the_table_that_it_holds() -> None:
-    found = number_tables(solved("tractor-single"))
-    assert found["weights"].head[0] == "weight"
-    assert found["balance-factors"].head[0] == "throw of"
+    result = number_tables(solved("tractor-single"))
+    assert result["weights"].head[0] == "weight"
+    assert result["balance-factors"].head[0] == "throw of"
 
 
 @pytest.mark.slow
@@ -309,8 +309,8 @@ def test_a_willans_line_is_a_file_with_its_readings() -> None:
 @pytest.mark.slow
 def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
     """Wear counted load by load, and lengths that no turn changes, against the forces of the other file."""
-    found = number_tables(evaluate_only(load(PROBLEMS / "tractor-four-bearings.toml")))
-    forces, crank, wear = found["forces"], found["bearings-on-crank"], found["wear"]
+    result = number_tables(evaluate_only(load(PROBLEMS / "tractor-four-bearings.toml")))
+    forces, crank, wear = result["forces"], result["bearings-on-crank"], result["wear"]
     name = wear.head[3].removeprefix("wear of ").removesuffix(" [-]")
     point = crank.rows[0][0]
     lateral, vertical = (

@@ -33,17 +33,17 @@ def fields(thing: object) -> str:
 
 def is_read_back(result: Result, folder: Path) -> None:
     """Everything that both have is the same, to the last bit."""
-    found = saved(result, folder, series=True)
-    assert (found.name, found.title) == (result.problem.name, result.problem.title)
-    assert (found.status, found.message, found.conflict) == (result.status, result.message, result.conflict)
-    assert fields(found.certificate) == fields(result.certificate)
-    assert fields(found.decisions) == fields(result.decisions)
-    assert fields(found.objective) == fields(result.objective)
-    assert found.to_dataframe().equals(result.to_dataframe())
-    assert repr(found).partition(" ")[2] == repr(result).partition(" ")[2]
+    actual = saved(result, folder, series=True)
+    assert (actual.name, actual.title) == (result.problem.name, result.problem.title)
+    assert (actual.status, actual.message, actual.conflict) == (result.status, result.message, result.conflict)
+    assert fields(actual.certificate) == fields(result.certificate)
+    assert fields(actual.decisions) == fields(result.decisions)
+    assert fields(actual.objective) == fields(result.objective)
+    assert actual.to_dataframe().equals(result.to_dataframe())
+    assert repr(actual).partition(" ")[2] == repr(result).partition(" ")[2]
     if result.status.has_design:
-        assert fields(found.limits) == fields(limits_of(result))
-    assert found.record == json.loads(as_json(result, series=True))
+        assert fields(actual.limits) == fields(limits_of(result))
+    assert actual.record == json.loads(as_json(result, series=True))
 
 
 @pytest.mark.slow
@@ -117,8 +117,8 @@ def test_a_missing_result_is_refused(tmp_path: Path) -> None:
 
 
 def test_null_is_no_number(tmp_path: Path) -> None:
-    found = saved(scenes.solved(scenes.IMPOSSIBLE), tmp_path)
-    assert found.objective is None
-    assert found.certificate is None
+    result = saved(scenes.solved(scenes.IMPOSSIBLE), tmp_path)
+    assert result.objective is None
+    assert result.certificate is None
     prices = [limit.shadow_price for limit in saved(scenes.stated(scenes.GIVEN), tmp_path).limits]
     assert all(math.isnan(price) for price in prices)

@@ -242,40 +242,40 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
 
 def result_with_reach(problem: Problem, status: Status, seconds: float | None = None) -> Result:
     """Return the result with attainable limits, as if a method had ended with this status."""
-    found = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
+    actual = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
     with limit_time(seconds):
-        return with_attainable_limits(found, problem, {Kind.UNBALANCE}, 1.0, solve)
+        return with_attainable_limits(actual, problem, {Kind.UNBALANCE}, 1.0, solve)
 
 
 @pytest.mark.slow
 def test_a_design_that_was_overlooked_is_the_result() -> None:
     """Whatever a method says: what the exact model shows to keep all limits is a design."""
     for status in (Status.FAILED, Status.INFEASIBLE):
-        found = result_with_reach(problem_of([LIGHT | {"max": "2 kg"}, QUIET | {"max": "2 kN"}]), status)
-        assert found.status is Status.FEASIBLE
-        assert found.final.violation(found.problem.limits) <= 1e-5
-        assert found.objective.name == "mean mount force"
-        assert found.objective.value == pytest.approx(found.final.value(found.problem.objective[0].measure))
-        assert found.certificate.lower_bound == 0.0
-        assert found.error_estimate == objective_error(found.problem, found.final) > 0.0
-        assert not found.reached
+        result = result_with_reach(problem_of([LIGHT | {"max": "2 kg"}, QUIET | {"max": "2 kN"}]), status)
+        assert result.status is Status.FEASIBLE
+        assert result.final.violation(result.problem.limits) <= 1e-5
+        assert result.objective.name == "mean mount force"
+        assert result.objective.value == pytest.approx(result.final.value(result.problem.objective[0].measure))
+        assert result.certificate.lower_bound == 0.0
+        assert result.error_estimate == objective_error(result.problem, result.final) > 0.0
+        assert not result.reached
 
 
 def test_a_failed_search_is_infeasible_by_its_bound() -> None:
-    found = result_with_reach(problem_of([LIGHT, QUIET]), Status.FAILED)
-    assert found.status is Status.INFEASIBLE
-    assert set(found.conflict) == {"light", "quiet"}
-    assert "none that meets the other limits meets 'quiet'" in found.message
+    result = result_with_reach(problem_of([LIGHT, QUIET]), Status.FAILED)
+    assert result.status is Status.INFEASIBLE
+    assert set(result.conflict) == {"light", "quiet"}
+    assert "none that meets the other limits meets 'quiet'" in result.message
     # the light limit may be one of those that are not needed for that
-    assert "needed" not in explained(found)
-    assert found.decisions == ()
+    assert "needed" not in explained(result)
+    assert result.decisions == ()
 
 
 def test_nothing_is_looked_at_when_time_is_over() -> None:
-    found = result_with_reach(SCENES["vee"], Status.INFEASIBLE, 1e-9)
-    assert [each.why for each in found.reached] == [LONG]
-    assert all(math.isnan(each.value) for each in found.reached)
-    assert "no time left" in attainable(found)[0]
+    result = result_with_reach(SCENES["vee"], Status.INFEASIBLE, 1e-9)
+    assert [each.why for each in result.reached] == [LONG]
+    assert all(math.isnan(each.value) for each in result.reached)
+    assert "no time left" in attainable(result)[0]
 
 
 class Clock:
@@ -302,9 +302,9 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     steps: list[Step] = []
     none = infeasible_result(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
     with limit_time(0.4), progress_listener(steps.append):
-        found = with_attainable_limits(none, problem, {Kind.UNBALANCE}, 1.0, slow)
-    assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
-    assert all("at the time limit" in text for text in attainable(found)[:2])
+        result = with_attainable_limits(none, problem, {Kind.UNBALANCE}, 1.0, slow)
+    assert [(each.ended, each.why) for each in result.reached] == [(True, "")] * 2
+    assert all("at the time limit" in text for text in attainable(result)[:2])
     assert shares[:2] == pytest.approx([0.2, 0.2])
     reach = [(step.done, step.whole) for step in steps if step.what == "attainable limits"]
     assert reach == [(0, 2), (1, 2)]

@@ -44,15 +44,15 @@ def test_a_peak_between_angles_keeps_its_limit() -> None:
         return design.value(problem.limits[0].measure)
 
     plain = solve_cones(model.at(48)).x
-    found = allowed_optimum(problem, model, 48, zero_level)
+    result = allowed_optimum(problem, model, 48, zero_level)
     assert plain is not None
-    assert found is not None
+    assert result is not None
     assert peak(plain) > 9000.0 * (1.0 + 1e-4)
-    assert 9000.0 * 0.99 < peak(found.x) <= 9000.0 * (1.0 + 3.0 * FEASIBLE)
+    assert 9000.0 * 0.99 < peak(result.x) <= 9000.0 * (1.0 + 3.0 * FEASIBLE)
     fine = model.at(960)
     best = solve_cones(fine).x
     assert best is not None
-    assert fine.objective(found.x) == pytest.approx(fine.objective(best), rel=2e-3)
+    assert fine.objective(result.x) == pytest.approx(fine.objective(best), rel=2e-3)
 
 
 def test_designs_of_equal_loads_end_at_the_lightest() -> None:
@@ -65,9 +65,9 @@ def test_designs_of_equal_loads_end_at_the_lightest() -> None:
     affine = AffineProblem(((1.0, norm),), (), domains_of(decisions), 2)
     problem = SimpleNamespace(objective=(), load_limits=())
     x = np.array([0.4, 1e11, 0.6, 0.7])
-    found = break_ties(problem, affine, x)
-    assert norm.rows(found) == pytest.approx(norm.rows(x), rel=1e-6)
-    assert found[3] == pytest.approx(0.0, abs=1e-6)
+    result = break_ties(problem, affine, x)
+    assert norm.rows(result) == pytest.approx(norm.rows(x), rel=1e-6)
+    assert result[3] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_rounding_is_no_move_of_a_limit() -> None:

@@ -152,9 +152,9 @@ def test_an_order_of_one_is_that_objective(tmp_path: Path) -> None:
 
 
 def test_a_rank_without_a_proof_has_no_bound(tmp_path: Path) -> None:
-    found = solve_lexicographic(loaded(tmp_path, TWO), lambda stage: replace(solve(stage), certificate=None))
-    assert len(found.ranks) == 2
-    for rank in found.ranks:
+    result = solve_lexicographic(loaded(tmp_path, TWO), lambda stage: replace(solve(stage), certificate=None))
+    assert len(result.ranks) == 2
+    for rank in result.ranks:
         assert (rank.lower_bound, rank.proof) == (0.0, Proof.NONE)
         assert rank.gap == np.inf
 

@@ -217,10 +217,10 @@ def test_a_mass_in_the_objective_where_nothing_is_to_be_gained() -> None:
     weights = AffineNorm(NORMS["mean"], np.zeros((1, 2)), np.eye(2)[None], Grid(np.ones(1), 1))
     domain = Domain(Decision("d", "kg m", Sector(100.0), 0.0, ()), 0)
     problem = AffineProblem(((1.0, norm), (0.1, weights)), (), (domain,), ROWS)
-    found = newton_solution(problem)
-    assert found is not None
-    assert np.abs(found[0]).max() <= 1e-9
-    assert lower_bound(problem, found[1]).value == pytest.approx(1.0, rel=1e-8)
+    result = newton_solution(problem)
+    assert result is not None
+    assert np.abs(result[0]).max() <= 1e-9
+    assert lower_bound(problem, result[1]).value == pytest.approx(1.0, rel=1e-8)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in NORMS.values() if kind.is_smooth], ids=str)

@@ -130,9 +130,9 @@ def test_mean_of_lengths_reaches_zero_cleanly(workers):
         x, ca.sum1(softened_lengths(rows, softness)) / 50, np.full(2, -1.0), np.full(2, 1.0),
         parameters=softness, stages=((1e-2,), (1e-5,), (1e-9,)),
     )  # fmt: skip
-    found = solve_nonlinear(program, spread_starts(program.lower, program.upper, 4), workers=workers)
-    assert len(found) == 4
-    for optimum in found:
+    result = solve_nonlinear(program, spread_starts(program.lower, program.upper, 4), workers=workers)
+    assert len(result) == 4
+    for optimum in result:
         assert optimum.usable
         assert optimum.x == pytest.approx(target, abs=1e-12)
         assert optimum.value == pytest.approx(0.0, abs=1e-12)
@@ -153,10 +153,10 @@ def test_limits_that_contradict_are_called_so():
         x, x[0], np.array([-5.0]), np.array([5.0]), constraints=ca.vertcat(x[0] ** 2, x[0]),
         constraint_lower=np.array([4.0, -1.0]), constraint_upper=np.array([np.inf, 1.0]),
     )  # fmt: skip
-    found = solve_nonlinear(program, [np.array([0.5])])
-    assert found[0].ending is Ending.INFEASIBLE
-    assert not found[0].usable
-    assert found[0].violation > 0.1
+    result = solve_nonlinear(program, [np.array([0.5])])
+    assert result[0].ending is Ending.INFEASIBLE
+    assert not result[0].usable
+    assert result[0].violation > 0.1
 
 
 def test_a_function_without_a_value_is_called_so():
@@ -170,11 +170,11 @@ def test_many_starts_find_the_best_of_several_optima_in_every_order():
     program = NonlinearProgram(x, ca.sin(5 * x[0]) + 0.1 * x[0] ** 2, np.array([-4.0]), np.array([4.0]))
     values = set()
     for seed in range(3):
-        found = solve_nonlinear(program, spread_starts(program.lower, program.upper, 16, seed), workers=1)
-        apart = distinct_optima(found, 1.0)
+        result = solve_nonlinear(program, spread_starts(program.lower, program.upper, 16, seed), workers=1)
+        apart = distinct_optima(result, 1.0)
         assert len(apart) >= 3
         assert [o.value for o in apart] == sorted(o.value for o in apart)
-        values.add(round(found[0].value, 8))
+        values.add(round(result[0].value, 8))
     assert len(values) == 1
 
 
@@ -190,18 +190,18 @@ def waves(softness: float = 0.0) -> NonlinearProgram:
 def test_one_of_equal_starts_goes_on_and_no_optimum_is_lost():
     """Check that starts left in the first stage end no better than the best optimum."""
     starts = spread_starts(np.array([-4.0]), np.array([4.0]), 24)
-    found = solve_nonlinear(waves(0.3), starts, workers=1, stop_when=lambda optima: False)
+    result = solve_nonlinear(waves(0.3), starts, workers=1, stop_when=lambda optima: False)
     alone = [solve_nonlinear(waves(0.3), [start], workers=1)[0] for start in starts]
     apart = distinct_optima(alone, 1.0, 1e-9)
-    assert len(found) == len(apart)
-    assert found[0].value == pytest.approx(apart[0].value, abs=1e-12)
+    assert len(result) == len(apart)
+    assert result[0].value == pytest.approx(apart[0].value, abs=1e-12)
     stayed = 0
     for own in apart:
-        end = min(found, key=lambda o: abs(o.x[0] - own.x[0]))
+        end = min(result, key=lambda o: abs(o.x[0] - own.x[0]))
         assert end.x == pytest.approx(own.x, abs=1e-3)
         assert end.starts == sum(abs(own.value - a.value) < 1e-9 for a in alone)
         stayed += abs(end.value - own.value) > 1e-9
-        assert end.value == pytest.approx(own.value, abs=1e-12) or found[0].value <= end.value < own.value
+        assert end.value == pytest.approx(own.value, abs=1e-12) or result[0].value <= end.value < own.value
     assert 0 < stayed < len(apart) - 1
 
 

@@ -83,8 +83,8 @@ def _minimum() -> tuple[float, ...]:
         for share in np.linspace(0.0, 1.0, 9)
     ]
     bounds = [(0.08, 0.10), (-0.012, 0.025), (0.0, 1.0)]
-    found = minimize(lambda x: _rms_mount_force(*x) / 100.0, min(grid)[1:], bounds=bounds, method="L-BFGS-B")
-    return min(grid)[0], 100.0 * float(found.fun), *map(float, found.x)
+    result = minimize(lambda x: _rms_mount_force(*x) / 100.0, min(grid)[1:], bounds=bounds, method="L-BFGS-B")
+    return min(grid)[0], 100.0 * float(result.fun), *map(float, result.x)
 
 
 def test_a_pin_offset_and_a_stroke_are_those_of_an_independent_search(tmp_path: Path) -> None:
@@ -184,10 +184,10 @@ def test_an_engine_that_cannot_turn_is_left_out_and_not_built(tmp_path: Path) ->
     rod = next(decision for decision in problem.decisions if decision.name == "engine.rod_length")
     with pytest.raises(ModelError, match="blocks the crank"):
         problem.fixed_at([0.04], [rod])
-    found = searched(problem)
-    part = found.final.engine.slider_cranks[0]
+    result = searched(problem)
+    part = result.final.engine.slider_cranks[0]
     assert part.rod_length > part.crank_radius + abs(part.offset)
-    assert found.objective.value <= searched(problem.fix("engine.rod_length")).objective.value * (1.0 + 1e-6)
+    assert result.objective.value <= searched(problem.fix("engine.rod_length")).objective.value * (1.0 + 1e-6)
 
 
 def test_a_bound_of_what_is_given_twice_is_one_line(tmp_path: Path) -> None:

@@ -69,9 +69,9 @@ def test_no_feasible_design_is_better(objective: Measure) -> None:
             for k in range(2):
                 size = np.hypot(*u[2 * k : 2 * k + 2])
                 u[2 * k : 2 * k + 2] *= min(1.0, 0.008 / size)
-            found = value_at(p, u)
-            assert found >= result.objective.value * (1.0 - 2e-4)
-            assert found >= result.certificate.lower_bound * (1.0 - 1e-6)
+            actual = value_at(p, u)
+            assert actual >= result.objective.value * (1.0 - 2e-4)
+            assert actual >= result.certificate.lower_bound * (1.0 - 1e-6)
 
 
 @OBJECTIVES
@@ -257,8 +257,8 @@ def test_several_points_and_terms() -> None:
     assert result.objective is not None
     rated, slower = (result.final.value(replace(MEAN_MOUNT_FORCE, points=(name,))) for name in ("rated", "slow"))
     assert result.final.value(MEAN_MOUNT_FORCE) == pytest.approx((rated + 3.0 * slower) / 4.0, rel=1e-12)
-    found = minimize(lambda u: value_at(both, 0.01 * u) / 1e3, np.full(4, -0.3), method="SLSQP")
-    assert 1e3 * found.fun >= result.objective.value * (1.0 - 2e-4)
+    actual = minimize(lambda u: value_at(both, 0.01 * u) / 1e3, np.full(4, -0.3), method="SLSQP")
+    assert 1e3 * actual.fun >= result.objective.value * (1.0 - 2e-4)
 
 
 def test_scaling_masses_and_speed_scales_the_optimum() -> None:

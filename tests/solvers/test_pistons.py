@@ -178,10 +178,10 @@ def test_masses_at_an_uneven_speed_are_decided_locally(tmp_path: Path) -> None:
 )
 def test_problems_without_a_special_method_are_searched(text: str, tmp_path: Path) -> None:
     """A light piston turns most evenly; of weights that follow its mass the force is least at the lightest too."""
-    found = searched(loaded(tmp_path, text))
-    assert {d.name.split(".")[-1]: d.value for d in found.decisions}.popitem() is not None
-    mass = next(d for d in found.decisions if "reciprocating" in d.name)
-    assert mass.value == pytest.approx(0.2, abs=1e-3) or found.objective.value < found.objective.initial
+    result = searched(loaded(tmp_path, text))
+    assert {d.name.split(".")[-1]: d.value for d in result.decisions}.popitem() is not None
+    mass = next(d for d in result.decisions if "reciprocating" in d.name)
+    assert mass.value == pytest.approx(0.2, abs=1e-3) or result.objective.value < result.objective.initial
 
 
 def test_an_open_crank_beside_its_pistons_is_decided_star_by_star(tmp_path: Path) -> None:

@@ -40,33 +40,33 @@ def bounded(result: Result, share: float, worse: float = 1.0) -> Result:
 def test_a_design_of_the_relaxation_has_the_higher_of_both_bounds(problem: Problem, free: Result) -> None:
     """The method of the whole problem finds a worse design, but its bound is higher."""
     own = bounded(free, 0.98, worse=1.1)
-    found = solve_by_relaxation(problem, free.problem, lambda _: bounded(free, 0.9), lambda _: own)
+    result = solve_by_relaxation(problem, free.problem, lambda _: bounded(free, 0.9), lambda _: own)
     assert free.objective is not None
     assert free.certificate is not None
-    assert found.objective is not None
-    assert found.certificate is not None
-    assert found.objective.value == free.objective.value
-    assert found.certificate.lower_bound == 0.98 * free.certificate.lower_bound
-    assert [limit.name for limit in found.limits] == [limit.name for limit in problem.limits]
+    assert result.objective is not None
+    assert result.certificate is not None
+    assert result.objective.value == free.objective.value
+    assert result.certificate.lower_bound == 0.98 * free.certificate.lower_bound
+    assert [limit.name for limit in result.limits] == [limit.name for limit in problem.limits]
 
 
 def test_an_optimum_that_violates_an_omitted_limit_gives_its_bound_alone(problem: Problem, free: Result) -> None:
     (limit,) = problem.limits
     tight = problem.changed(limits=(replace(limit, maximum=0.5 * free.final.value(limit.measure)),))
     own = bounded(free, 0.0, worse=1.5)
-    found = solve_by_relaxation(tight, free.problem, lambda _: free, lambda _: own)
+    result = solve_by_relaxation(tight, free.problem, lambda _: free, lambda _: own)
     assert free.certificate is not None
     assert own.objective is not None
-    assert found.objective is not None
-    assert found.certificate is not None
-    assert found.objective.value == own.objective.value
-    assert found.certificate.lower_bound == free.certificate.lower_bound
-    assert found.certificate.kind is Proof.LOCAL
+    assert result.objective is not None
+    assert result.certificate is not None
+    assert result.objective.value == own.objective.value
+    assert result.certificate.lower_bound == free.certificate.lower_bound
+    assert result.certificate.kind is Proof.LOCAL
 
 
 def test_a_relaxation_without_any_design_leaves_none(problem: Problem, free: Result) -> None:
     none = replace(free, status=Status.INFEASIBLE, certificate=None)
-    found = solve_by_relaxation(problem, free.problem, lambda _: none, lambda _: free)
-    assert found.status is Status.INFEASIBLE
+    result = solve_by_relaxation(problem, free.problem, lambda _: none, lambda _: free)
+    assert result.status is Status.INFEASIBLE
     failed = replace(none, status=Status.FAILED)
     assert solve_by_relaxation(problem, free.problem, lambda _: failed, lambda _: free) is free

@@ -62,9 +62,9 @@ def test_a_constant_limit_is_judged_at_many_angles() -> None:
 def test_a_program_in_which_nothing_is_open_is_its_own_answer() -> None:
     """Check the bound of a program without open numbers, as of a box of one point."""
     model = AffineModel(problem({}, objective={"minimise": "rms shaking force"})).at(48)
-    found = solve_cones(model)
-    assert found.x is not None
-    assert best_bound(model, found.x, found.multipliers).value == pytest.approx(model.objective(found.x), rel=1e-12)
+    result = solve_cones(model)
+    assert result.x is not None
+    assert best_bound(model, result.x, result.multipliers).value == pytest.approx(model.objective(result.x), rel=1e-12)
 
 
 def test_a_crank_of_a_box_that_breaks_a_limit_is_no_design() -> None:

@@ -289,8 +289,8 @@ def test_value_and_gradient_are_those_of_the_exact_model(name: str) -> None:
 def test_scipy_finds_the_optimum_and_the_package_proves_it() -> None:
     problem = ready("tractor-four-lanchester")
     objective = problem.objective_function()
-    found = minimize(objective, objective.start, jac=True, bounds=objective.bounds)
-    proven = laufruhe.certify(problem, objective.values(found.x))
+    result = minimize(objective, objective.start, jac=True, bounds=objective.bounds)
+    proven = laufruhe.certify(problem, objective.values(result.x))
     assert proven.certificate is not None
     assert proven.certificate.kind is Proof.GLOBAL
     with pytest.raises(InputError, match="no vector of 8 finite numbers"):

@@ -73,9 +73,9 @@ def total_lines() -> int:
 def inside(node: ast.AST) -> Iterator[ast.AST]:
     """Statements of a statement, with the arms of `try` and `match`; expressions hold neither functions nor imports."""
     for field in ("body", "orelse", "finalbody", "handlers", "cases"):
-        found = getattr(node, field, None)
-        if isinstance(found, list):
-            yield from found
+        result = getattr(node, field, None)
+        if isinstance(result, list):
+            yield from result
 
 
 def functions(tree: ast.AST, prefix: str = "") -> Iterator[tuple[str, Function]]:
@@ -279,15 +279,15 @@ def still_allowed(name: str, allowed: set[str]) -> bool:
 
 
 def main() -> None:
-    found = measured()
+    result = measured()
     if "--prune" in sys.argv:
         allowed = exceptions()
         allowed_names = {
-            rule: {name for name in names if still_allowed(name, allowed[rule])} for rule, names in found.items()
+            rule: {name for name in names if still_allowed(name, allowed[rule])} for rule, names in result.items()
         }
         EXCEPTIONS.write_text(written(allowed_names), encoding="utf-8")
         return
-    sys.stdout.write(written(found) + f"\n# {total_lines()} lines in all\n")
+    sys.stdout.write(written(result) + f"\n# {total_lines()} lines in all\n")
 
 
 if __name__ == "__main__":

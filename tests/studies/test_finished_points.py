@@ -63,8 +63,8 @@ def test_a_byte_changed_anywhere_costs_one_point(tmp_path: Path) -> None:
         spoilt = bytearray(content)
         spoilt[place] = rng.choice([value for value in range(256) if value != content[place]])
         path.write_bytes(spoilt)
-        found = trusted(path)
-        assert len(found) == 4 or (len(found) == 5 and content[place : place + 1] == b"\n")
+        result = trusted(path)
+        assert len(result) == 4 or (len(result) == 5 and content[place : place + 1] == b"\n")
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -75,13 +75,13 @@ def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
     rng.shuffle(whole)
     cut = whole.pop(rng.randrange(len(whole)))
     path.write_bytes(b"".join(whole) + cut[: rng.randrange(len(cut))])
-    found = trusted(path)
-    assert len(found) >= 4
+    result = trusted(path)
+    assert len(result) >= 4
     # what is added after a line that was cut is not lost with it
-    missing = next((k for k in range(5) if k not in found), 0)
+    missing = next((k for k in range(5) if k not in result), 0)
     with FinishedPoints(path, MARKS) as store:
         store.keep(MARKS[missing], 0.25, RECORDS[missing])
-    assert sorted({*found, missing}) == trusted(path)
+    assert sorted({*result, missing}) == trusted(path)
 
 
 @pytest.mark.parametrize(

@@ -240,9 +240,9 @@ def test_swept_values_are_numbers_with_their_unit(
 
 
 def test_paths_know_their_field() -> None:
-    found = field_at("balancer_shafts.front.unbalances.1.unbalance")
-    assert found is not None
-    assert found.unit == "kg m"
+    result = field_at("balancer_shafts.front.unbalances.1.unbalance")
+    assert result is not None
+    assert result.unit == "kg m"
     assert field_at("engine.layout") is None
     assert field_at("engine.no.such.path") is None
 

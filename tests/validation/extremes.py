@@ -155,10 +155,10 @@ def nearly_balanced() -> Entry:
         first = engine.slider_cranks[0]
         heavier = first.reciprocating_mass * (1.0 + delta)
         changed = replace(engine, slider_cranks=(replace(first, reciprocating_mass=heavier), *engine.slider_cranks[1:]))
-        found = reciprocating_loads(changed, 300.0).at(1)[2]
+        result = reciprocating_loads(changed, 300.0).at(1)[2]
         extra = float(Fraction(heavier) - Fraction(first.reciprocating_mass))
         exact = -extra * first.crank_radius * 300.0**2 * acceleration_orders(first.rod_ratio, 0.0, 12)[1]
-        errors.append(float(abs(found - exact) / abs(exact)) * delta / EPS)
+        errors.append(float(abs(result - exact) / abs(exact)) * delta / EPS)
     return Entry(
         "nearly balanced six: one piston heavier by 1e-2 to 1e-10",
         "the difference, in exact arithmetic",

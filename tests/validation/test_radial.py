@@ -127,16 +127,16 @@ class Star:
             matrix[4] = (0, arm.imag, -arm.real, -below.imag, below.real)
             torque = sum(((place - middle).conjugate() * pull).imag for place, pull in to_master) if k == 0 else 0.0
             right[4] = inertia * float(np.real(turning)) - torque
-            found = np.linalg.solve(matrix, right)
-            against = -side * found[0]
-            on_pins[k], on_walls[k] = -complex(found[3], found[4]), -float(found[0])
+            result = np.linalg.solve(matrix, right)
+            against = -side * result[0]
+            on_pins[k], on_walls[k] = -complex(result[3], result[4]), -float(result[0])
             force += against - push
             # Mx = y Fz - z Fy counts against the sense of angles
             roll -= (high.conjugate() * against).imag
             if k:
-                to_master.append((low, -complex(found[3], found[4])))
+                to_master.append((low, -complex(result[3], result[4])))
             else:
-                force -= complex(found[3], found[4])
+                force -= complex(result[3], result[4])
         return force, roll, on_pins, on_walls
 
     @staticmethod
@@ -220,8 +220,8 @@ def test_gas_reaches_pins_and_walls_through_the_master_rod(five: Problem) -> Non
                 pressed[k] = float(-thrust_at(gas, part, engine.cycle, np.array([since]))[0])
             _, _, on_pins, on_walls = star.solved(phi, pressed, massless=True)
             size, at = max(abs(pin) for pin in on_pins), np.array([phi])
-            found = pins.values(at)[0]
-            assert found[:, 2] + 1j * found[:, 1] == pytest.approx(on_pins, abs=1e-4 * size)
+            result = pins.values(at)[0]
+            assert result[:, 2] + 1j * result[:, 1] == pytest.approx(on_pins, abs=1e-4 * size)
             assert -walls.values(at)[0][:, 1] == pytest.approx(on_walls, abs=1e-4 * size)
 
 

@@ -173,10 +173,10 @@ def test_efficient_points_are_those_that_nothing_beats(four: xr.Dataset) -> None
 
 def test_verdicts_of_the_four(four: xr.Dataset) -> None:
     """The force pair is worth building; the moment pair does less than the study says."""
-    found = verdicts(four)
-    assert [v.agrees for v in found["force pair"]] == [True, True]
-    assert found["moment pair"][0].agrees
-    better, falls = found["both"]
+    result = verdicts(four)
+    assert [v.agrees for v in result["force pair"]] == [True, True]
+    assert result["moment pair"][0].agrees
+    better, falls = result["both"]
     assert better.agrees
     assert not falls.agrees
     assert falls.paper == "-53 %"
@@ -185,9 +185,9 @@ def test_verdicts_of_the_four(four: xr.Dataset) -> None:
 
 
 def test_worth_is_judged_against_fewer_shafts_and_the_next_engine(four: xr.Dataset) -> None:
-    found = worths(four)
-    assert [found[name][0] for name in ("force pair", "moment pair", "both")] == [True, False, False]
-    assert "slight: -14" in found["both"][1]
+    result = worths(four)
+    assert [result[name][0] for name in ("force pair", "moment pair", "both")] == [True, False, False]
+    assert "slight: -14" in result["both"][1]
 
 
 def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
@@ -197,10 +197,10 @@ def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
     assert better.agrees
     assert falls.agrees
     assert falls.computed == pytest.approx(-54.9, abs=0.3)
-    found = worths(data)
-    assert found["both"][0]
-    assert not found["force pair"][0]
-    assert "five without shafts run smoother" in found["force pair"][1]
+    result = worths(data)
+    assert result["both"][0]
+    assert not result["force pair"][0]
+    assert "five without shafts run smoother" in result["force pair"][1]
 
 
 @pytest.mark.parametrize(("mass", "fall"), [(1.25, 0.152), (2.25, 0.308)])

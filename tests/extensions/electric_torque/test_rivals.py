@@ -127,10 +127,10 @@ def test_no_design_of_slsqp_lies_under_the_bound(seed: int) -> None:
     scales = np.repeat([largest if order else 1.0 for order in rivals.orders], 2)
     unit = rivals.value(np.zeros(len(own))) or 1.0
     for start in (own, 0.9 * own, *(rivals.allowed(scales * rng.normal(size=len(own))) for _ in range(4))):
-        found = minimize(
+        actual = minimize(
             lambda x: rivals.value(x * scales, rivals.few) / unit, start / scales, method="SLSQP",
             constraints={"type": "ineq", "fun": lambda x: rivals.spare(x * scales, 360)},
             options={"maxiter": 60, "ftol": 1e-12},
         )  # fmt: skip
-        for rival in (start, found.x * scales):
+        for rival in (start, actual.x * scales):
             assert rivals.value(rivals.allowed(rival)) >= bound * (1.0 - 1e-9 - sampling)

@@ -116,5 +116,5 @@ def test_problems_finished_in_time_have_pages(tmp_path: Path, monkeypatch: pytes
 
 def test_objectives_beyond_a_trade_are_reported() -> None:
     first = ("Of 2 objectives in order the first is traded.",)
-    found = replace(_trade(_row("one", 1.0, 0.0, math.nan)), left_out=first)
-    assert first[0] in str(trade_document(found, None, "trade"))
+    result = replace(_trade(_row("one", 1.0, 0.0, math.nan)), left_out=first)
+    assert first[0] in str(trade_document(result, None, "trade"))

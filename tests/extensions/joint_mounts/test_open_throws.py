@@ -46,9 +46,9 @@ def throws_of(table: dict[str, Any]) -> OpenThrows:
     assert phasing.throw_bounds is not None
     middle = tuple(0.5 * (low + high) for low, high in phasing.throw_bounds)
     bank, split = phasing.minimum_geometry
-    found = throws_at(problem, phasing, Candidate(middle, None, bank, split))
-    assert found is not None
-    return found
+    result = throws_at(problem, phasing, Candidate(middle, None, bank, split))
+    assert result is not None
+    return result
 
 
 def own_at(table: dict[str, Any], throws: np.ndarray) -> OwnModel:

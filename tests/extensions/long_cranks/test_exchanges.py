@@ -35,8 +35,8 @@ def test_exchanges_lead_to_stars_that_no_exchange_betters(tmp_path, name):
     model, stars = model_of(problem)
     values = {tuple(map(int, star)): coarse_value(model, tuple(map(int, star)), ()) for star in stars}
     worst = max(values, key=values.__getitem__)
-    found = improved(model, worst, ())
-    value = coarse_value(model, found, ())
+    result = improved(model, worst, ())
+    value = coarse_value(model, result, ())
     # five throws: every star that has throw 1 where it is stands a few exchanges away
     assert value == pytest.approx(min(values.values()), rel=1e-5)
     assert value < values[worst]

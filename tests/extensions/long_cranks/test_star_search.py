@@ -138,9 +138,9 @@ def test_some_throws_are_arranged_in_every_order(throws):
         Free.from_throws(np.arange(throws, dtype=np.uint8), (1, 2, 3, 4)),
     )
     wide = Window((1, 2), (np.inf, np.inf))
-    found = np.concatenate([block for own in shares_of(space, free) for block in meeting(space, free, own, wide)])
-    assert len(np.unique(found, axis=0)) == len(found) == 24
-    assert (found[:, 5:] == np.arange(5, throws)).all()
+    result = np.concatenate([block for own in shares_of(space, free) for block in meeting(space, free, own, wide)])
+    assert len(np.unique(result, axis=0)) == len(result) == 24
+    assert (result[:, 5:] == np.arange(5, throws)).all()
 
 
 @pytest.mark.parametrize("throws", [4, 7, 8, 9, 10])
@@ -181,11 +181,11 @@ def test_looking_at_every_star_ends_with_the_time(seconds, name):
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("laufruhe.numerics.budget.time", Clock())
         patched.setattr("laufruhe.physics.crank_stars.BLOCK", 64)
-        found = enumerate_stars(space, objective, 3, time_limit=float(seconds))
-    assert len(found.values)
-    assert found.complete == (found.nodes == every.nodes)
-    assert found.lower_bound <= every.values[0] * (1.0 + 1e-12) <= found.values[0] * (1.0 + 1e-9)
-    np.testing.assert_allclose(objective.values(space, found.stars), found.values, rtol=1e-12, atol=1e-12)
+        result = enumerate_stars(space, objective, 3, time_limit=float(seconds))
+    assert len(result.values)
+    assert result.complete == (result.nodes == every.nodes)
+    assert result.lower_bound <= every.values[0] * (1.0 + 1e-12) <= result.values[0] * (1.0 + 1e-9)
+    np.testing.assert_allclose(objective.values(space, result.stars), result.values, rtol=1e-12, atol=1e-12)
 
 
 def test_enumeration_looks_at_more_stars_in_more_time(monkeypatch):
@@ -217,10 +217,10 @@ def test_cranks_with_halves_too_long_to_list_are_rearranged_while_time_is_left(m
 
 def test_a_search_out_of_time_claims_no_proof():
     objective = OBJECTIVES["rms of two"]
-    found = search_stars(whole(11), objective, 1, time_limit=0.0)
+    result = search_stars(whole(11), objective, 1, time_limit=0.0)
     proven = search_stars(whole(11), objective)
-    assert not found.complete
-    assert found.lower_bound <= proven.values[0] <= found.values[0]
+    assert not result.complete
+    assert result.lower_bound <= proven.values[0] <= result.values[0]
 
 
 @pytest.mark.parametrize("name", OBJECTIVES)
@@ -245,9 +245,9 @@ def test_in_pieces_it_stops_in_time(monkeypatch):
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
     space, objective = whole(9), OBJECTIVES["rms of two"]
     with working_on(SERIAL):
-        found = search_stars(space, objective, 1, time_limit=0.0)
-    assert not found.complete
-    assert found.lower_bound <= enumerate_stars(space, objective).values[0] * (1.0 + 1e-12)
+        result = search_stars(space, objective, 1, time_limit=0.0)
+    assert not result.complete
+    assert result.lower_bound <= enumerate_stars(space, objective).values[0] * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("throws", [16, 40])
@@ -255,20 +255,20 @@ def test_in_pieces_it_stops_in_time(monkeypatch):
 def test_long_cranks_without_couples_need_no_search(throws, name):
     """Throws in pairs, front and back alike, leave nothing: no star can have less, however many there are."""
     space = in_pairs(throws)
-    found = search_stars(space, OBJECTIVES[name], 8, time_limit=10.0)
-    assert found.complete
-    assert len(np.unique(found.stars, axis=0)) == 8
-    assert found.values == pytest.approx(0.0, abs=1e-9 * throws**2)
-    assert found.nodes < 100
+    result = search_stars(space, OBJECTIVES[name], 8, time_limit=10.0)
+    assert result.complete
+    assert len(np.unique(result.stars, axis=0)) == 8
+    assert result.values == pytest.approx(0.0, abs=1e-9 * throws**2)
+    assert result.nodes < 100
 
 
 @pytest.mark.parametrize("throws", [6, 14, 48])
 def test_a_search_that_nothing_is_left_of_ends(throws):
     """Forces alone, which even pairs cancel: every star is as good as the next, in pieces or not."""
     forces = StarAmplitudes((1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)),))
-    found = search_stars(in_pairs(throws), forces, 1, time_limit=10.0)
-    assert found.complete
-    assert found.values == pytest.approx([0.0], abs=1e-12 * throws)
+    result = search_stars(in_pairs(throws), forces, 1, time_limit=10.0)
+    assert result.complete
+    assert result.values == pytest.approx([0.0], abs=1e-12 * throws)
 
 
 def test_a_piece_may_be_left_without_stars(monkeypatch):
@@ -276,9 +276,9 @@ def test_a_piece_may_be_left_without_stars(monkeypatch):
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
     monkeypatch.setattr(star_search, "STARTS", 40)
     space, objective = whole(7), OBJECTIVES["one order"]
-    found = search_stars(space, objective, 1)
-    assert found.complete
-    assert found.values == pytest.approx(enumerate_stars(space, objective, 1).values, abs=1e-12)
+    result = search_stars(space, objective, 1)
+    assert result.complete
+    assert result.values == pytest.approx(enumerate_stars(space, objective, 1).values, abs=1e-12)
 
 
 def test_a_piece_without_an_answer_leaves_the_search_open(monkeypatch):
@@ -290,6 +290,6 @@ def test_a_piece_without_an_answer_leaves_the_search_open(monkeypatch):
 
     assert search_stars(space, objective).complete
     monkeypatch.setattr(star_search, "unordered_map", all_but_one)
-    found = search_stars(space, objective)
-    assert not found.complete
-    assert found.lower_bound == objective.lower_bound(space)
+    result = search_stars(space, objective)
+    assert not result.complete
+    assert result.lower_bound == objective.lower_bound(space)

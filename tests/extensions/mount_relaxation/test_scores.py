@@ -20,9 +20,9 @@ def test_scores_are_finite_without_a_lack(lacking: float, size: float) -> None:
     """Zero and the least numbers there are: no share overflows, which would be an error here, nor is one lost."""
     hidden = size * np.array([0.0, 0.5, 1.0])
     for pull in (np.zeros(3), np.array([5e-324, 0.0, 0.0])):
-        found = joint_scores(pull, hidden, lacking)
-        assert np.isfinite(found).all()
-        assert found[2] == found.max() > 0.0
+        result = joint_scores(pull, hidden, lacking)
+        assert np.isfinite(result).all()
+        assert result[2] == result.max() > 0.0
 
 
 def test_hidden_scores_are_weighted_by_the_lack() -> None:

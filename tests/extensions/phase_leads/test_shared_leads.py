@@ -71,12 +71,12 @@ def test_torque_changes_by_no_more_than_its_bound(seed: int) -> None:
 
     for half in (1e-4, 3e-3, 0.05):
         maximum = np.repeat(torque_change(gas, pair(ahead, ratio, *geometry)[0], cycle, half), 3)
-        here, found = torque(ahead), np.zeros(len(angles))
+        here, result = torque(ahead), np.zeros(len(angles))
         for by in (-1.0, -0.6, 0.3, 1.0):
-            found = np.maximum(found, np.abs(torque(ahead + by * half) - here))
-        assert (found <= maximum * (1.0 + 1e-9) + 1e-9 * np.abs(here).max()).all()
+            result = np.maximum(result, np.abs(torque(ahead + by * half) - here))
+        assert (result <= maximum * (1.0 + 1e-9) + 1e-9 * np.abs(here).max()).all()
         if half < 0.01:
-            assert np.sqrt(np.mean(maximum**2)) < 3.0 * np.sqrt(np.mean(found**2))
+            assert np.sqrt(np.mean(maximum**2)) < 3.0 * np.sqrt(np.mean(result**2))
 
 
 SPEEDS = [{"name": "loud", "speed": "2400 rpm", "weight": 3}, {"name": "calm", "speed": "900 rpm"}]

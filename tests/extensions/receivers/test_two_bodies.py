@@ -25,14 +25,14 @@ def test_points_move_as_the_two_bodies_do(seed: int) -> None:
     engine, frame = own.scene(seed)
     loads, none = own.wrenches(seed), np.zeros((len(engine.mounts), 3))
     points = [own.point("engine", PLACE, False), own.point("frame", PLACE, True)]
-    found = own.response(engine, Receivers(tuple(points), frame), loads)
-    assert not found[0].any()
+    result = own.response(engine, Receivers(tuple(points), frame), loads)
+    assert not result[0].any()
     for k, load in enumerate(loads[1:], 1):
         w = 0.5 * k * own.SPEED
         moved = own.answer(engine, frame, own.at_centre(load, engine.block.centre_of_gravity), none, w)
         for j, (motion, body) in enumerate(((moved.engine, engine.block), (moved.frame, frame.body))):
             expected = -(w**2) * own.arm(np.array(PLACE), np.array(body.centre_of_gravity)) @ motion
-            assert found[k, j] == pytest.approx(expected, rel=SAME, abs=SAME * np.abs(expected).max())
+            assert result[k, j] == pytest.approx(expected, rel=SAME, abs=SAME * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -56,14 +56,14 @@ def test_both_forces_with_their_functions_give_the_motion_of_the_frame(seed: int
     for name, matrices, on_frame in (("ground", with_engine, False), ("frame", without, True)):
         functions = tuple(function([matrix[axis] for matrix in matrices], frequencies) for axis in range(3))
         receivers.append(Receiver(name, "acceleration", None, False, functions, on_frame, band))
-    found = own.response(engine, Receivers(tuple(receivers), frame), loads)
-    size = np.abs(found).max()
-    assert found[1:, 1] == pytest.approx(found[1:, 0], rel=1e-8, abs=SAME * size)
-    assert found[1:, 2] == pytest.approx(found[1:, 0], rel=1e-8, abs=SAME * size)
+    result = own.response(engine, Receivers(tuple(receivers), frame), loads)
+    size = np.abs(result).max()
+    assert result[1:, 1] == pytest.approx(result[1:, 0], rel=1e-8, abs=SAME * size)
+    assert result[1:, 2] == pytest.approx(result[1:, 0], rel=1e-8, abs=SAME * size)
     # the mixture differs: a force on rigid ground with the function without the engine
     mixed = replace(receivers[2], takes_frame_force=False)
     wrong = own.response(engine, Receivers((mixed,), frame), loads)[:, 0]
-    assert np.abs(wrong - found[:, 0]).max() > 0.05 * size
+    assert np.abs(wrong - result[:, 0]).max() > 0.05 * size
 
 
 def test_a_heavy_frame_is_rigid_ground() -> None:

@@ -101,9 +101,9 @@ class TestExpressions:
 
     def test_numbers_build_on_one_another(self) -> None:
         tables = {"r": 2, "area": "pi * r**2", "k": {"from": 0, "to": 1, "points": 3}, "half": "k / 2"}
-        found = numbers_of({**tables, "r": 3}, {})
-        assert found["area"] == pytest.approx(9.0 * np.pi)
-        assert found["half"].values.tolist() == [0.0, 0.25, 0.5]
+        result = numbers_of({**tables, "r": 3}, {})
+        assert result["area"] == pytest.approx(9.0 * np.pi)
+        assert result["half"].values.tolist() == [0.0, 0.25, 0.5]
         with pytest.raises(ExpressionError, match="'k' is no grid"):
             numbers_of({"k": {"from": 0}}, {})
 

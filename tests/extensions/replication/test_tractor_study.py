@@ -253,9 +253,9 @@ class TestFourCylinder:
             point = replace(problem.points[0], speed=math.pi * cm / 0.12)
             return float(abs(shaking_loads(engine, point).at(2)[3]))
 
-        found = worth("fig-22", "cancel", reading=MEANT)
-        assert roll(found) < 0.1 * roll(10.0)
-        assert roll(found) < min(roll(found - 0.2), roll(found + 0.2))
+        result = worth("fig-22", "cancel", reading=MEANT)
+        assert roll(result) < 0.1 * roll(10.0)
+        assert roll(result) < min(roll(result - 0.2), roll(result + 0.2))
 
     def test_best_pairs(self, worth: Worth) -> None:
         """The optimum is below every point of the sweep: angles and the force pair are free there too."""
@@ -309,10 +309,10 @@ def test_isolation_from_root_two(worth: Worth) -> None:
 def test_free_force(worth: Worth) -> None:
     """4 m r w^2 (lambda + lambda^3/4): "about 1000 kp" with 2.25 kg, little over half of it with 1.25 kg."""
     for reading, force in ((PRINTED, 555.0), (MEANT, 998.0)):
-        found = worth("free-force", "force", reading=reading)
+        result = worth("free-force", "force", reading=reading)
         closed = worth("free-force", "4 * piston * (lam + lam**3 / 4) / kp", reading=reading)
-        assert found == pytest.approx(closed, rel=2e-3)
-        assert found == pytest.approx(force, rel=1e-3)
+        assert result == pytest.approx(closed, rel=2e-3)
+        assert result == pytest.approx(force, rel=1e-3)
 
 
 def test_no_compression_ratio_saves_the_printed_mass(worth: Worth) -> None:

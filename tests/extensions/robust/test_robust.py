@@ -105,12 +105,12 @@ def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result
     errors = tolerances_of(problem).draw(np.random.default_rng(99), 10_000)
     corners = np.array([[*ends, 1.0, 0.0, 0.0, 1.0] for ends in itertools.product((-1.0, 1.0), repeat=6)])
     many = np.concatenate([errors, corners])
-    found = objective_values(engines.terms, many)
-    assert found.max() <= worst(result) * (1.0 + 1e-12)
-    assert found.max() > 0.97 * worst(result)
-    for k in (*range(0, 10_000, 2_000), int(np.argmax(found))):
+    actual = objective_values(engines.terms, many)
+    assert actual.max() <= worst(result) * (1.0 + 1e-12)
+    assert actual.max() > 0.97 * worst(result)
+    for k in (*range(0, 10_000, 2_000), int(np.argmax(actual))):
         own = with_errors(problem, many[k])
-        assert objective_value(own, evaluate(own, own.design(values))) == pytest.approx(found[k], rel=1e-10)
+        assert objective_value(own, evaluate(own, own.design(values))) == pytest.approx(actual[k], rel=1e-10)
 
 
 def test_no_other_design_is_better(read: Callable[[str], Problem]) -> None:

@@ -65,9 +65,9 @@ def test_pistons_alone_at_the_dead_centre() -> None:
     """Compare the worst sum of a four-cylinder engine with 2 |s''_top| + 2 |s''_bottom|."""
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     part = problem.engine.slider_cranks[0]
-    found = sum(worst_parts(problem.engine, 1.0, tolerances_of(0.01)).values())
+    result = sum(worst_parts(problem.engine, 1.0, tolerances_of(0.01)).values())
     top, bottom = 1.0 + part.rod_ratio, 1.0 - part.rod_ratio
-    assert found == pytest.approx(0.01 * part.crank_radius * 2.0 * (top + bottom), rel=1e-6)
+    assert result == pytest.approx(0.01 * part.crank_radius * 2.0 * (top + bottom), rel=1e-6)
 
 
 def test_random_engines_stay_under_the_worst() -> None:
@@ -109,11 +109,11 @@ def test_second_order_outweighs_the_worst_sum() -> None:
 def test_quantiles_are_those_of_the_draws() -> None:
     problem = load(PROBLEMS / "tractor-six.toml")
     tolerances = tolerances_of(0.01, 5e-4, 2, 5e-5, (30.0,))
-    found = spread(problem, tolerances, 400, seed=3)
+    result = spread(problem, tolerances, 400, seed=3)
     drawn = random_forces(problem.engine, problem.points[0].speed, tolerances, 400, 3)
-    assert found["mean"] == pytest.approx(drawn.mean())
-    assert found["random"][100] == pytest.approx(np.median(drawn))
-    assert found["random"][-1] == drawn.max()
+    assert result["mean"] == pytest.approx(drawn.mean())
+    assert result["random"][100] == pytest.approx(np.median(drawn))
+    assert result["random"][-1] == drawn.max()
 
 
 def test_built_engines_stay_within_the_worst_sum() -> None:
@@ -142,9 +142,9 @@ def test_no_tolerances_build_the_drawing() -> None:
 def test_engines_without_mounts_have_no_mount_forces() -> None:
     problem = load(PROBLEMS / "tractor-six.toml")
     bare = replace(problem, engine=replace(problem.engine, mounts=()))
-    found = spread(bare, tolerances_of(0.01), 100)
-    assert np.isnan(found["mount"])
-    assert found["mean"] > 0.0
+    result = spread(bare, tolerances_of(0.01), 100)
+    assert np.isnan(result["mount"])
+    assert result["mean"] > 0.0
 
 
 def test_the_largest_density_is_one() -> None:

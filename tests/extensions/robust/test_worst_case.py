@@ -36,14 +36,14 @@ def all_errors(angles: int) -> Array:
 @pytest.mark.parametrize("name", NORMS)
 def test_worst_of_corners_and_circles(name: str, seed: int) -> None:
     terms = [(1.0, random_norm(name, seed)), (0.5, random_norm("mean", seed + 10))]
-    found = worst_case(terms, COLUMNS, 1e-4)
+    result = worst_case(terms, COLUMNS, 1e-4)
     brute = max(value_at(terms, z) for z in all_errors(180))
-    assert found.value == pytest.approx(value_at(terms, found.errors), rel=1e-12)
-    assert found.bound >= brute * (1.0 - 1e-12)
-    assert found.value >= brute * (1.0 - 2e-4)
-    assert found.value <= found.bound <= found.value * (1.0 + 1.01e-4)
-    assert np.hypot(*found.errors[3:]) <= 1.0 + 1e-12
-    assert np.abs(found.errors[:3]).max() <= 1.0
+    assert result.value == pytest.approx(value_at(terms, result.errors), rel=1e-12)
+    assert result.bound >= brute * (1.0 - 1e-12)
+    assert result.value >= brute * (1.0 - 2e-4)
+    assert result.value <= result.bound <= result.value * (1.0 + 1.01e-4)
+    assert np.hypot(*result.errors[3:]) <= 1.0 + 1e-12
+    assert np.abs(result.errors[:3]).max() <= 1.0
 
 
 @pytest.mark.parametrize("name", NORMS)
@@ -117,8 +117,8 @@ def test_an_arc_lies_in_its_trapezoid_and_its_ends_are_vertices() -> None:
 def test_no_errors_leave_the_drawing() -> None:
     norm = random_norm("mean", 7)
     bare = AffineNorm(norm.norm, norm.constant, norm.slope[..., :0], norm.grid)
-    found = worst_case([(2.0, bare)], (), 1e-4)
-    assert found.value == found.bound == pytest.approx(2.0 * norm.norm.value(norm.grid, norm.constant))
+    result = worst_case([(2.0, bare)], (), 1e-4)
+    assert result.value == result.bound == pytest.approx(2.0 * norm.norm.value(norm.grid, norm.constant))
 
 
 @pytest.mark.parametrize("name", NORMS)
@@ -128,19 +128,19 @@ def test_intervals_alone_end_at_their_worst_corner(name: str) -> None:
     constant, slope, grid = random.normal(size=(24, 2)), random.normal(size=(24, 2, 4)), Grid(np.full(24, 1 / 24), 12)
     norms = [AffineNorm(NORMS[own], constant[::step], slope[::step], grid) for own, step in ((name, 1), ("mean", -1))]
     terms = list(zip((3.0, 0.2), norms, strict=True))
-    found = worst_case(terms, tuple(slice(k, k + 1) for k in range(4)), 0.0)
+    result = worst_case(terms, tuple(slice(k, k + 1) for k in range(4)), 0.0)
     worst = max(value_at(terms, np.array(z)) for z in itertools.product((-1.0, 1.0), repeat=4))
-    assert found.value == pytest.approx(worst, rel=1e-9)
-    assert worst * (1.0 - 1e-12) <= found.bound <= worst * (1.0 + 1e-9)
+    assert result.value == pytest.approx(worst, rel=1e-9)
+    assert worst * (1.0 - 1e-12) <= result.bound <= worst * (1.0 + 1e-9)
 
 
 def test_wider_errors_are_never_better() -> None:
     norm, last = random_norm("mean", 8), 0.0
     for share in (0.0, 0.5, 1.0, 2.0):
         wider = AffineNorm(norm.norm, norm.constant, share * norm.slope, norm.grid)
-        found = worst_case([(1.0, wider)], COLUMNS, 1e-6)
-        assert found.value >= last
-        last = found.bound
+        result = worst_case([(1.0, wider)], COLUMNS, 1e-6)
+        assert result.value >= last
+        last = result.bound
 
 
 @pytest.mark.parametrize("discs", [1, 2])
@@ -152,7 +152,7 @@ def test_turning_unbalances_add_up(name: str, discs: int) -> None:
     slope = np.concatenate([(k + 1.0) * turned for k in range(discs)], axis=2)
     norm = AffineNorm(NORMS[name], np.zeros((36, 2)), slope, Grid(np.full(36, 1.0 / 36.0), 36))
     columns = tuple(slice(2 * k, 2 * k + 2) for k in range(discs))
-    found = worst_case([(1.0, norm)], columns, 1e-6)
-    assert found.bound == pytest.approx(sum(range(discs + 1)), rel=1e-6)
+    result = worst_case([(1.0, norm)], columns, 1e-6)
+    assert result.bound == pytest.approx(sum(range(discs + 1)), rel=1e-6)
     for own in columns:
-        assert np.hypot(*found.errors[own]) <= 1.0 + 1e-12
+        assert np.hypot(*result.errors[own]) <= 1.0 + 1e-12

@@ -69,10 +69,10 @@ def _over_chord(since: float) -> float:
 def test_chambers_are_what_is_between_housing_and_rotor() -> None:
     """Y3: to the area of a polygon of 20,000 corners; the flank, whatever its shape, adds the same at every angle."""
     angles = np.linspace(0.0, 6.0 * math.pi, 25)
-    found = chamber_volume(UNIT, angles)
+    result = chamber_volume(UNIT, angles)
     drawn = B * np.array([_over_chord(angle) for angle in angles])
-    np.testing.assert_allclose(found, drawn - drawn[0], atol=1e-8 * UNIT.displacement)
-    assert found.max() == pytest.approx(UNIT.displacement, rel=1e-12)
+    np.testing.assert_allclose(result, drawn - drawn[0], atol=1e-8 * UNIT.displacement)
+    assert result.max() == pytest.approx(UNIT.displacement, rel=1e-12)
 
 
 @pytest.mark.parametrize("radius", [0.06, 0.105, 0.15])
@@ -128,8 +128,8 @@ class TestGas:
             about_the_centre = (np.conj(0.5 * (line[1:] + line[:-1])) * outward).imag.sum()
             # the teeth carry nothing
             assert abs(about_the_centre) < 1e-12 * R**2
-        found = pin_forces(_of(UNIT), self.point).values(np.array([phi]))[0, 0]
-        assert complex(found[2], found[1]) == pytest.approx(total, rel=1e-4)
+        result = pin_forces(_of(UNIT), self.point).values(np.array([phi]))[0, 0]
+        assert complex(result[2], result[1]) == pytest.approx(total, rel=1e-4)
 
     def test_all_that_presses_on_block_and_shaft_leaves_the_wrench(self) -> None:
         """Housing and bearings together: the force of eq. 13 alone, and the moment that the torque needs."""
@@ -202,8 +202,8 @@ def test_an_uneven_speed_loads_the_block_through_the_teeth() -> None:
     motion = crank_motion(_of(unit), point, uneven)
     tooth = INERTIA * motion.acceleration / 3.0 / (3.0 * E)
     expected = crank_torque(_of(unit), point).values(motion.angle) + tooth * 2.0 * E
-    found = shaking_loads(_of(unit), point, uneven).sample(uneven.samples)[:, 3]
-    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+    result = shaking_loads(_of(unit), point, uneven).sample(uneven.samples)[:, 3]
+    np.testing.assert_allclose(result, expected, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.slow
@@ -236,8 +236,8 @@ class TestWeights:
         places, radii = np.array([0.15, 0.0, -0.16]), np.array([0.05, 0.05, 0.095])
         rows = np.vstack([radii, radii * places])
         couple = (MASS + 1.6) * E * (0.065 + 0.065)
-        found = linprog(np.ones(6), A_eq=np.hstack([rows, -rows]), b_eq=[0.0, -couple])
-        assert result.objective.value == pytest.approx(found.fun, rel=1e-6)
+        actual = linprog(np.ones(6), A_eq=np.hstack([rows, -rows]), b_eq=[0.0, -couple])
+        assert result.objective.value == pytest.approx(actual.fun, rel=1e-6)
 
 
 def _ends(count: int) -> str:

@@ -49,8 +49,8 @@ class TestRotary:
             force = pressure_at(gas, self.unit, Cycle.TWO_STROKE, phi - 1.5 * math.pi) - gas.crankcase_pressure
             torque -= 0.015 * force * self.unit.piston_area * np.sin(2.0 * phi / 3.0)
         engine = Engine("rotary", Cycle.TWO_STROKE, (self.unit,))
-        found = gas_loads(engine, gas).values(turned - math.pi)[:, 3]
-        np.testing.assert_allclose(found, torque, rtol=1e-4)
+        result = gas_loads(engine, gas).values(turned - math.pi)[:, 3]
+        np.testing.assert_allclose(result, torque, rtol=1e-4)
 
     @pytest.mark.parametrize("degrees", [0, 77, 400, 1000])
     def test_speed_and_acceleration_of_an_apex(self, degrees: int) -> None:

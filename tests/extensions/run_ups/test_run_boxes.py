@@ -154,12 +154,12 @@ def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) ->
     middle = np.repeat(boxes.middles[1:2], len(sizes), axis=0)
     width = sizes[:, None] * np.minimum(middle - boxes.model.lower, boxes.model.upper - middle)
     for number, measure in enumerate(OF_RUNS):
-        found = boxes.runs.under(measure, middle - width, middle + width)
-        bounds = minimum(found)
+        result = boxes.runs.under(measure, middle - width, middle + width)
+        bounds = minimum(result)
         assert np.all(np.diff(np.maximum(bounds, 0.0)) >= -1e-9 * bounds[-1])
         assert bounds[-1] == pytest.approx(boxes.values(middle[0])[number], rel=1e-5)
         # squares are in the rest as well, as far as they are under
-        assert found.remainder[5] < 1.2e-2 * found.remainder[4] + 1e-12 * bounds[-1]
+        assert result.remainder[5] < 1.2e-2 * result.remainder[4] + 1e-12 * bounds[-1]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -174,13 +174,13 @@ def test_the_place_and_time_with_the_highest_bound_is_taken(seed: int) -> None:
     look = _RunBounds.__new__(_RunBounds)
     look._equations = SimpleNamespace(first=rng.normal(size=(boxes, sides, 2, 2)))
     look._steps = SimpleNamespace(pairs=pairs)
-    found = look._best(size, slopes, bent, rest)
+    result = look._best(size, slopes, bent, rest)
     for box in range(boxes):
         each = [
             size[box, p, t] - sum(abs(slopes[box, :, p, t])) - sum(bent[box, :, p, t]) - rest[box, p, t]
             for p in range(places) for t in range(times)
         ]  # fmt: skip
-        assert minimum(found)[box] == pytest.approx(max(each), rel=1e-12)
+        assert minimum(result)[box] == pytest.approx(max(each), rel=1e-12)
 
 
 @pytest.mark.slow
@@ -231,15 +231,15 @@ def test_roots_of_stiffness_are_as_near_as_they_say() -> None:
         slopes = np.stack([np.outer(v, v) for v in r.normal(size=(3, 6))])
         units = np.sqrt(np.outer(squares, squares))
         slopes *= r.uniform(0.05, 0.95) / np.linalg.eigvalsh(slopes.sum(axis=0) / units)[-1]
-        found = roots(squares[None], slopes[None], 7)
-        assert found.middle.shape == (1, 7, 7)
-        assert not found.middle[0, 6].any()
+        result = roots(squares[None], slopes[None], 7)
+        assert result.middle.shape == (1, 7, 7)
+        assert not result.middle[0, 6].any()
         for d in np.vstack([r.uniform(-1.0, 1.0, (10, 3)), r.choice([-1.0, 1.0], (6, 3))]):
             values, modes = np.linalg.eigh(np.diag(squares) + np.tensordot(d, slopes, axes=1))
             exact = np.pad((modes / np.sqrt(values)) @ modes.T, [(0, 1), (0, 1)])
-            once = found.middle[0] + np.tensordot(d, found.first[0], axes=1)
-            twice = once + sum(d[j] * d[k] * own for own, (j, k) in zip(found.second[0], pairs_of(3), strict=True))
-            for near, left in ((once, found.after_first[0]), (twice, found.after_second[0])):
+            once = result.middle[0] + np.tensordot(d, result.first[0], axes=1)
+            twice = once + sum(d[j] * d[k] * own for own, (j, k) in zip(result.second[0], pairs_of(3), strict=True))
+            for near, left in ((once, result.after_first[0]), (twice, result.after_second[0])):
                 assert np.all(np.abs(exact - near) <= left * (1.0 + 1e-9) + 1e-15)
 
 
@@ -392,8 +392,8 @@ def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
         place["stiffness"] = [{"between": ["0 N/mm", "300 N/mm"], "start": "100 N/mm"}, "200 N/mm", "200 N/mm"]
     problem = load_tables(tables, Path("loose.toml"))
     model = BoxModel(problem, evaluate_start(problem))
-    found = RunBoxes(model, OF_RUNS).under(OF_RUNS[1], model.lower[None], model.upper[None])
-    assert minimum(found)[0] == -np.inf
+    result = RunBoxes(model, OF_RUNS).under(OF_RUNS[1], model.lower[None], model.upper[None])
+    assert minimum(result)[0] == -np.inf
 
 
 def stopped(maximum: str, stiffness: str = "300 N/mm", further: tuple[str, ...] = (), **more: Any) -> Problem:

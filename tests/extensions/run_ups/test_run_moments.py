@@ -20,7 +20,7 @@ def test_moments_are_integrals_of_the_polynomials_and_sizes_are_over_them(place:
     wrenches = rng.normal(size=(NODES, 6, sweep.count)) * np.where(np.arange(sweep.count) % 2, 100.0, 1.0)
     load = rng.normal(size=(5, 6))
     own = RunMoments(sweep, wrenches.reshape(6 * NODES, -1), load, times)
-    found, whole = own.ending_at(place), own.step
+    result, whole = own.ending_at(place), own.step
     nodes = 0.5 * (np.polynomial.legendre.leggauss(NODES)[0] + 1.0)
     points, shares = np.polynomial.legendre.leggauss(12)
     points, shares = 0.5 * (points + 1.0), 0.5 * shares
@@ -30,8 +30,8 @@ def test_moments_are_integrals_of_the_polynomials_and_sizes_are_over_them(place:
         return np.einsum("as,ai->is", bases, wrenches[:, :, step])
 
     ahead = -place % times
-    assert len(found.impulses) == (ahead + sweep.count) // times
-    for long in range(len(found.impulses)):
+    assert len(result.impulses) == (ahead + sweep.count) // times
+    for long in range(len(result.impulses)):
         moments, push, maximum = np.zeros((MOMENTS, 6)), 0.0, 0.0
         for k in range(times):
             step = long * times - ahead + k
@@ -42,9 +42,9 @@ def test_moments_are_integrals_of_the_polynomials_and_sizes_are_over_them(place:
                 moments[order] += sweep.step * values @ (shares * (whole - at) ** order) / math.factorial(order)
             sizes = np.linalg.norm(load @ polynomial(step, np.linspace(0.0, 1.0, 101)), axis=0)
             maximum, push = max(maximum, float(sizes.max())), push + sweep.step * float(sizes.mean())
-        assert found.moments[:, :, long] == pytest.approx(moments, rel=1e-9, abs=1e-12 * np.abs(moments).max())
-        assert maximum <= found.peak_loads[long] < 10.0 * maximum
-        assert push <= found.impulses[long] < 20.0 * push
+        assert result.moments[:, :, long] == pytest.approx(moments, rel=1e-9, abs=1e-12 * np.abs(moments).max())
+        assert maximum <= result.peak_loads[long] < 10.0 * maximum
+        assert push <= result.impulses[long] < 20.0 * push
     short = own.short(np.array([-1, 2, sweep.count]))
     assert not short[[0, 2]].any()
     values = polynomial(2, points)

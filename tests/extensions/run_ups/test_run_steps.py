@@ -24,9 +24,9 @@ def test_wrenches_of_steps_have_the_integral_of_the_load() -> None:
     """An order of inertia, which grows with the square of speed, through every step by itself."""
     sweep = Sweep(20.0, 15.0, 0.01, 12)
     load = np.array([[1.0 + 2.0j, 0.0, -0.5j, 0.0, 0.0, 0.3]])
-    found = sweep.wrenches([(np.array([2.0]), load)]).reshape(NODES, 6, -1)
+    result = sweep.wrenches([(np.array([2.0]), load)]).reshape(NODES, 6, -1)
     _, weights = np.polynomial.legendre.leggauss(NODES)
-    by_steps = 0.5 * sweep.step * np.einsum("a,ait->it", weights, found)
+    by_steps = 0.5 * sweep.step * np.einsum("a,ait->it", weights, result)
 
     def exact(t: float, component: int) -> float:
         angle = 20.0 * t + 7.5 * t * t

@@ -39,11 +39,11 @@ def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
     result = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))
     assert result.objective.value == pytest.approx(alone.objective.value)
     assert result.certificate.kind == alone.certificate.kind
-    found = next(limit for limit in result.limits if limit.name == "run-up travel")
-    assert 0.0 < found.value < 2e-3
+    actual = next(limit for limit in result.limits if limit.name == "run-up travel")
+    assert 0.0 < actual.value < 2e-3
     record = as_dict(result)["run_up"]
     assert record["up_to"] == pytest.approx(1000.0 * RPM)
-    assert max(record[way]["travel"] for way in ("up", "down")) == found.value
+    assert max(record[way]["travel"] for way in ("up", "down")) == actual.value
     # integrated at ten times the steps and a thousandth of the tolerance
     design = result.final
     point = min(result.problem.points, key=lambda p: p.speed)

@@ -38,7 +38,7 @@ def test_loads_of_a_run_are_taken_at_the_gauss_points() -> None:
     sweep = Sweep(20.0, 15.0, 0.003, 7)
     loads = [(np.array(orders), rng.normal(size=(2, 6)) + 1j * rng.normal(size=(2, 6))) for orders in ([1, 2], [0, 3])]
     nodes = 0.5 * (np.polynomial.legendre.leggauss(NODES)[0] + 1.0)
-    found = sweep.wrenches(loads).reshape(NODES, 6, sweep.count)
+    result = sweep.wrenches(loads).reshape(NODES, 6, sweep.count)
     for n, node in enumerate(nodes):
         for k in range(sweep.count):
             t = (k + node) * sweep.step
@@ -46,7 +46,7 @@ def test_loads_of_a_run_are_taken_at_the_gauss_points() -> None:
             first, second = (
                 sum((own * np.exp(1j * h * angle)).real for h, own in zip(*load, strict=True)) for load in loads
             )
-            assert found[n, :, k] == pytest.approx(speed**2 * first + second, rel=1e-12)
+            assert result[n, :, k] == pytest.approx(speed**2 * first + second, rel=1e-12)
 
 
 @pytest.mark.parametrize("seconds", [4.0, 90.0])

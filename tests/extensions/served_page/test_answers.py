@@ -43,14 +43,14 @@ def tight() -> dict[str, Any]:
 
 
 def test_the_follower_estimates_the_proven_optimum(tight: dict[str, Any]) -> None:
-    found = follow(LANCHESTER, edits=(TIGHT,))
+    result = follow(LANCHESTER, edits=(TIGHT,))
     proven = tight["claim"]
     assert proven["kind"] == "proven"
-    assert found["claim"]["kind"] == "estimate"
-    assert not found["claim"]["is_last"]
-    assert found["claim"]["value"] == pytest.approx(proven["value"], rel=2e-3)
-    assert found["claim"]["value"] >= proven["value"] * (1 - 1e-6)
-    (limit,) = found["limits"]
+    assert result["claim"]["kind"] == "estimate"
+    assert not result["claim"]["is_last"]
+    assert result["claim"]["value"] == pytest.approx(proven["value"], rel=2e-3)
+    assert result["claim"]["value"] >= proven["value"] * (1 - 1e-6)
+    (limit,) = result["limits"]
     assert limit["active"]
     assert limit["price"] == pytest.approx(tight["limits"][0]["price"], rel=0.02)
     assert limit["value"] <= 0.5 * (1 + 1e-6)
@@ -92,10 +92,10 @@ def test_a_design_that_breaks_a_limit_is_no_optimum(monkeypatch: pytest.MonkeyPa
     result = solved("tractor-single")
     broken = replace(result, status=Status.FAILED, message="the best design found breaks 'sag'")
     monkeypatch.setattr(answers, "solve", lambda *_, **__: broken)
-    found = settle(PROBLEMS / "tractor-single.toml")
-    assert found["design"] is None
-    assert found["claim"]["kind"] == "no design"
-    assert "breaks 'sag'" in found["claim"]["words"]
+    actual = settle(PROBLEMS / "tractor-single.toml")
+    assert actual["design"] is None
+    assert actual["claim"]["kind"] == "no design"
+    assert "breaks 'sag'" in actual["claim"]["words"]
 
 
 def test_limits_that_contradict_each_other_are_named() -> None:
@@ -125,16 +125,16 @@ def test_limits_that_contradict_each_other_are_named() -> None:
     ],
 )
 def test_a_bad_state_is_one_line(edit: Edit, said: str) -> None:
-    found = follow(LANCHESTER, edits=(edit,))
-    assert set(found) == {"error"}
-    assert said in found["error"]
-    assert len(found["error"].splitlines()) == 1
+    result = follow(LANCHESTER, edits=(edit,))
+    assert set(result) == {"error"}
+    assert said in result["error"]
+    assert len(result["error"].splitlines()) == 1
 
 
 @pytest.mark.parametrize("name", ["title", "gas.model", "gas.file", "engine.layout", "mounts.positions.1", "assembly"])
 def test_numbers_that_were_not_offered_are_refused(name: str) -> None:
-    found = follow(LANCHESTER, edits=(Edit("set", name, "../../etc/passwd"),))
-    assert "does not offer" in found["error"]
+    result = follow(LANCHESTER, edits=(Edit("set", name, "../../etc/passwd"),))
+    assert "does not offer" in result["error"]
 
 
 @pytest.mark.parametrize(
@@ -162,16 +162,16 @@ def test_a_page_state_is_read() -> None:
 
 @pytest.mark.slow
 def test_a_crank_is_ranked_held_and_chosen() -> None:
-    found = settle(VEE)
-    assert len(found["ranking"]) == 5
-    assert found["claim"]["value"] == pytest.approx(found["ranking"][0]["value"], rel=1e-4)
-    held = tuple(Edit(*edit) for edit in found["holds"])
+    result = settle(VEE)
+    assert len(result["ranking"]) == 5
+    assert result["claim"]["value"] == pytest.approx(result["ranking"][0]["value"], rel=1e-4)
+    held = tuple(Edit(*edit) for edit in result["holds"])
     following = follow(VEE, fixed=held)["claim"]
     assert following["kind"] == "held"
     assert "for this crank" in following["words"]
-    assert found["claim"]["value"] <= following["value"] * (1 + 1e-6)
-    assert following["value"] == pytest.approx(found["claim"]["value"], rel=5e-3)
-    second = found["ranking"][1]
+    assert result["claim"]["value"] <= following["value"] * (1 + 1e-6)
+    assert following["value"] == pytest.approx(result["claim"]["value"], rel=5e-3)
+    second = result["ranking"][1]
     chosen = settle(VEE, edits=(Edit("star", "star", second["orders"][0]["star"]),))
     assert chosen["claim"]["value"] == pytest.approx(second["value"], rel=1e-4)
     assert chosen["ranking"] == []
@@ -218,8 +218,8 @@ def test_a_front_comes_as_a_whole_first_and_no_point_is_dominated() -> None:
     assert all(point["bound"]["value"] <= point["value"] * (1 + 1e-6) for point in points)
     assert all("no design has less than" in point["words"] for point in points)
     # the optimum under a limit is on the front of that limit
-    found = follow(LANCHESTER, edits=(Edit("set", "constraints.1.max", f"{by_mass[4]['across']!r} kg"),))
-    assert found["claim"]["value"] == pytest.approx(by_mass[4]["value"], rel=1e-4)
+    result = follow(LANCHESTER, edits=(Edit("set", "constraints.1.max", f"{by_mass[4]['across']!r} kg"),))
+    assert result["claim"]["value"] == pytest.approx(by_mass[4]["value"], rel=1e-4)
     assert (
         "is not the name of a measure"
         in json.loads(answers.front(source(LANCHESTER), PageState(), "beauty", 0))["error"]
@@ -256,7 +256,7 @@ def test_a_number_of_the_file_is_held_where_it_stands_until_it_is_searched() -> 
     assert [slider["name"] for slider in first["model"]["sliders"]] == ["web.balance_factor"]
     assert "for the other numbers of the file" in first["claim"]["words"]
     assert held["limits"][0]["value"] < 0.99 * first["limits"][0]["value"]
-    found = settle(path)["claim"]
-    assert found["kind"] == "found"
-    assert "no useful bound" in found["words"]
-    assert found["value"] == pytest.approx(laufruhe.solve(path).objective.value, rel=1e-9)
+    result = settle(path)["claim"]
+    assert result["kind"] == "found"
+    assert "no useful bound" in result["words"]
+    assert result["value"] == pytest.approx(laufruhe.solve(path).objective.value, rel=1e-9)

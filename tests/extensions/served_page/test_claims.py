@@ -60,37 +60,37 @@ def exact(path: Path, design: dict[str, float], *edits: Edit) -> float:
 )
 def test_a_crank_that_is_not_ranked_yet_has_an_estimate(name: str, value: float, words: str) -> None:
     path = INPUTS / f"{name}.toml" if name == "rank-all-cranks" else PROBLEMS / f"{name}.toml"
-    found = follow(path, OPEN_CRANK)
-    assert found["claim"]["kind"] == "held"
-    assert found["claim"]["lead"].startswith("Estimate ")
-    assert found["claim"]["value"] == pytest.approx(value, rel=1e-3)
-    assert words in found["claim"]["words"]
-    assert is_modest(found["claim"])
+    result = follow(path, OPEN_CRANK)
+    assert result["claim"]["kind"] == "held"
+    assert result["claim"]["lead"].startswith("Estimate ")
+    assert result["claim"]["value"] == pytest.approx(value, rel=1e-3)
+    assert words in result["claim"]["words"]
+    assert is_modest(result["claim"])
 
 
 @pytest.mark.slow
 def test_a_ranked_crank_is_proven() -> None:
-    found = settle(PROBLEMS / "tractor-four-lanchester.toml", OPEN_CRANK)
-    assert found["claim"]["kind"] == "proven"
-    assert found["claim"]["value"] == pytest.approx(227.25, abs=0.01)
-    assert found["claim"]["lead"] == "Optimum 227.25 N"
-    assert "no design has less than 227.2" in found["claim"]["words"]
+    result = settle(PROBLEMS / "tractor-four-lanchester.toml", OPEN_CRANK)
+    assert result["claim"]["kind"] == "proven"
+    assert result["claim"]["value"] == pytest.approx(227.25, abs=0.01)
+    assert result["claim"]["lead"] == "Optimum 227.25 N"
+    assert "no design has less than 227.2" in result["claim"]["words"]
 
 
 @pytest.mark.slow
 def test_places_and_a_crank_are_decided_together_before_anything_is_proven() -> None:
     """Far under what any estimate of given places, or of a given crank, has."""
-    found = settle(INPUTS / "rank-all-cranks.toml", OPEN_CRANK)
-    assert found["claim"]["value"] == pytest.approx(458.65, abs=0.02)
-    assert found["claim"]["kind"] in ("proven", "found")
+    result = settle(INPUTS / "rank-all-cranks.toml", OPEN_CRANK)
+    assert result["claim"]["value"] == pytest.approx(458.65, abs=0.02)
+    assert result["claim"]["kind"] in ("proven", "found")
 
 
 @pytest.mark.parametrize("name", ["rank-all-cranks", "tractor-four-lanchester"])
 def test_a_limit_that_moves_has_no_bound_beside_it(name: str) -> None:
     path = INPUTS / f"{name}.toml" if name == "rank-all-cranks" else PROBLEMS / f"{name}.toml"
-    found = follow(path, Edit("set", "constraints.1.max", "1.5 kg"))
-    assert is_modest(found["claim"])
-    assert not {"bound", "gap", "proof", "optimum"} & set(json.dumps(found).replace('"', " ").split())
+    result = follow(path, Edit("set", "constraints.1.max", "1.5 kg"))
+    assert is_modest(result["claim"])
+    assert not {"bound", "gap", "proof", "optimum"} & set(json.dumps(result).replace('"', " ").split())
 
 
 @pytest.mark.parametrize(
@@ -99,11 +99,11 @@ def test_a_limit_that_moves_has_no_bound_beside_it(name: str) -> None:
 def test_an_estimate_is_what_its_design_has(name: str, minimum: float) -> None:
     """Check an estimate against its design at many angles, and that no design has less."""
     path = INPUTS / f"{name}.toml"
-    found = follow(path)
-    assert found["claim"]["kind"] == "estimate"
-    assert found["claim"]["value"] == pytest.approx(exact(path, found["design"]), rel=1e-12)
-    assert found["claim"]["value"] >= minimum
-    assert is_modest(found["claim"])
+    result = follow(path)
+    assert result["claim"]["kind"] == "estimate"
+    assert result["claim"]["value"] == pytest.approx(exact(path, result["design"]), rel=1e-12)
+    assert result["claim"]["value"] >= minimum
+    assert is_modest(result["claim"])
 
 
 @pytest.mark.slow
@@ -111,18 +111,18 @@ def test_an_estimate_is_what_its_design_has(name: str, minimum: float) -> None:
     ("name", "value"), [("few-angles-below-any-design", 1508.9), ("few-angles-16-percent-below", 3837.4)]
 )
 def test_the_whole_problem_is_solved_at_enough_angles(name: str, value: float) -> None:
-    found = settle(INPUTS / f"{name}.toml")
-    assert found["claim"]["value"] == pytest.approx(value, rel=1e-3)
-    assert found["claim"]["is_last"]
+    result = settle(INPUTS / f"{name}.toml")
+    assert result["claim"]["value"] == pytest.approx(value, rel=1e-3)
+    assert result["claim"]["is_last"]
 
 
 def test_a_limit_that_the_shown_design_breaks_is_marked_at_once() -> None:
     path = INPUTS / "held-mounts-break-sag.toml"
-    found = follow(path)
-    sag = next(limit for limit in found["limits"] if limit["name"] == "static sag")
-    assert found["claim"]["kind"] == "held"
-    assert "for these mounts" in found["claim"]["words"]
-    assert found["claim"]["breaks"] == "breaks static sag (2.501 mm, at most 1.800 mm)"
+    result = follow(path)
+    sag = next(limit for limit in result["limits"] if limit["name"] == "static sag")
+    assert result["claim"]["kind"] == "held"
+    assert "for these mounts" in result["claim"]["words"]
+    assert result["claim"]["breaks"] == "breaks static sag (2.501 mm, at most 1.800 mm)"
     assert sag["broken"]
     assert sag["words"] == "broken: 2.501 mm, at most 1.800 mm"
     wide = follow(path, Edit("set", "constraints.2.max", "3 mm"))
@@ -135,17 +135,17 @@ def test_a_limit_of_the_ready_elastic_four_is_marked_as_it_moves() -> None:
     problem = load(path)
     sag = next(limit for limit in problem.limits if limit.name == "static sag")
     value = evaluate(problem).value(sag.measure)
-    found = follow(path, Edit("set", "constraints.1.max", f"{value / 1.58!r} m"))
-    assert "breaks static sag" in found["claim"]["breaks"]
-    assert is_modest(found["claim"])
+    result = follow(path, Edit("set", "constraints.1.max", f"{value / 1.58!r} m"))
+    assert "breaks static sag" in result["claim"]["breaks"]
+    assert is_modest(result["claim"])
 
 
 def test_limits_on_numbers_that_wait_are_named_and_measured() -> None:
     path = PROBLEMS / "soft-single-run-up.toml"
-    found = follow(path)
-    assert found["claim"]["words"].endswith("without the limits on run-up twist and run-up travel")
-    twist = next(limit for limit in found["limits"] if limit["name"] == "run-up twist")
-    assert twist["broken"] == ("run-up twist" in found["claim"]["breaks"])
+    result = follow(path)
+    assert result["claim"]["words"].endswith("without the limits on run-up twist and run-up travel")
+    twist = next(limit for limit in result["limits"] if limit["name"] == "run-up twist")
+    assert twist["broken"] == ("run-up twist" in result["claim"]["breaks"])
 
 
 def test_a_claim_carries_the_position_of_the_settings_that_it_is_about() -> None:
@@ -160,9 +160,9 @@ def test_a_claim_names_held_decisions() -> None:
     names = [decision.name for decision in load(path).decisions if not decision.is_affine]
     held = tuple(Edit("fix", name, f"{-200 if name.endswith('z') else 100 * (1 - 2 * ('right' in name))} mm")
                  for name in names)  # fmt: skip
-    found = follow(path, held=held)
-    assert found["claim"]["kind"] == "held"
-    assert found["claim"]["words"].endswith("for these shaft positions")
+    result = follow(path, held=held)
+    assert result["claim"]["kind"] == "held"
+    assert result["claim"]["words"].endswith("for these shaft positions")
     # fixed by the user, they are part of the problem
     assert follow(path, *held)["claim"]["kind"] == "estimate"
 

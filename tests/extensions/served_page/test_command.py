@@ -83,8 +83,8 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
     address = running.stdout.readline().partition(": ")[2].strip()
     answered = answer(address, "/begin", {})
     assert (answered["title"], answered["file"]) == ("Tractor four-cylinder with a Lanchester balancer", "mine.toml")
-    found = answer(address, "/follow", {"edits": [["set", "constraints.1.max", "0.5 kg"]]})
-    assert found["claim"]["kind"] == "estimate"
+    result = answer(address, "/follow", {"edits": [["set", "constraints.1.max", "0.5 kg"]]})
+    assert result["claim"]["kind"] == "estimate"
     running.send_signal(signal.SIGINT)
     began = time.monotonic()
     _, err = running.communicate(timeout=LONG)

@@ -38,20 +38,20 @@ def test_more_room_is_never_worse_and_prices_are_slopes(follower: Follower) -> N
 def test_the_proven_optimum_lies_between_bound_and_value(name: str) -> None:
     problem = load(PROBLEMS / f"{name}.toml")
     assert can_follow(problem)
-    found, proven = Follower(problem).at(problem.limits), solve(problem).objective
+    result, proven = Follower(problem).at(problem.limits), solve(problem).objective
     assert proven is not None
-    design = evaluate(problem, problem.design(found.values))
-    assert found.bound <= proven.value * (1 + 1e-9)
+    design = evaluate(problem, problem.design(result.values))
+    assert result.bound <= proven.value * (1 + 1e-9)
     assert proven.value * (1 - 1e-4) <= objective_value(problem, design) <= proven.value * (1 + 2e-3)
 
 
 def test_a_limit_that_no_design_keeps_is_named(follower: Follower) -> None:
     problem = load(PROBLEMS / "tractor-four-bearings.toml")
     tight = [replace(limit, maximum=10.0) if limit.measure.is_load else limit for limit in problem.limits]
-    found = Follower(problem).at(tight)
-    assert found.conflict
-    assert set(found.conflict) <= {limit.name for limit in problem.limits}
-    assert found.values == ()
+    result = Follower(problem).at(tight)
+    assert result.conflict
+    assert set(result.conflict) <= {limit.name for limit in problem.limits}
+    assert result.values == ()
 
 
 def test_problems_with_loads_that_are_not_affine_are_not_followed() -> None:
@@ -68,6 +68,6 @@ def test_problems_with_loads_that_are_not_affine_are_not_followed() -> None:
 def test_piston_masses_are_followed_if_rod_inertia_has_no_effect() -> None:
     problem = load(PROBLEMS / "tractor-four-seven-metres.toml")
     assert can_follow(problem)
-    found, proven = Follower(problem).at(problem.limits), solve(problem).objective
+    result, proven = Follower(problem).at(problem.limits), solve(problem).objective
     assert proven is not None
-    assert found.bound <= proven.value * (1 + 1e-9)
+    assert result.bound <= proven.value * (1 + 1e-9)

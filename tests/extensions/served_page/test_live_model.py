@@ -190,8 +190,8 @@ def test_a_channel_that_nobody_named_is_not_followed(every):
     ],
 )
 def test_a_reference_is_named_by_what_was_proven_of_it(proof, name, proven):
-    found = reference_of(1.0, proof, 0.026)
-    assert (found["name"], found["is_proven"]) == (name, proven)
+    result = reference_of(1.0, proof, 0.026)
+    assert (result["name"], result["is_proven"]) == (name, proven)
 
 
 def test_a_served_page_takes_its_reference_from_its_server(every):

@@ -160,10 +160,10 @@ def test_pieces_of_the_shaft_are_in_balance(engine: Engine) -> None:
 
 def test_journals_hand_on_the_torque_of_what_stands_before_them(engine: Engine) -> None:
     angles = np.linspace(0.0, 12.0, 17)
-    found = strength.journal_torques(engine, POINT, EXACT).values(angles)
+    result = strength.journal_torques(engine, POINT, EXACT).values(angles)
     whole = crank_torque(engine, POINT).values(angles)
     first = crank_torque(replace(engine, slider_cranks=engine.slider_cranks[:1]), POINT).values(angles)
-    assert found == pytest.approx(np.stack([0.0 * whole, first, whole], axis=1), abs=1e-9 * np.abs(whole).max())
+    assert result == pytest.approx(np.stack([0.0 * whole, first, whole], axis=1), abs=1e-9 * np.abs(whole).max())
 
 
 def test_stresses_are_measures_of_a_problem() -> None:

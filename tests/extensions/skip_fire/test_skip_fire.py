@@ -49,11 +49,11 @@ def model_of(path: Path, cycles: int = 1, state: str = "cut", inertia: float = 0
 @pytest.mark.parametrize(("length", "step"), [(1, 1), (6, 1), (8, 4), (9, 1), (9, 3), (10, 2)])
 def test_patterns_are_all_words_up_to_rotation(length: int, step: int) -> None:
     for firings in range(length + 1):
-        found = list(patterns(length, firings, step))
+        result = list(patterns(length, firings, step))
         words = {"".join(word) for word in itertools.product("01", repeat=length) if word.count("1") == firings}
-        assert len(found) == count_patterns(length, firings, step)
-        assert set().union(*(rotations(pattern, step) for pattern in found)) == words
-        assert sum(len(rotations(pattern, step)) for pattern in found) == len(words)
+        assert len(result) == count_patterns(length, firings, step)
+        assert set().union(*(rotations(pattern, step) for pattern in result)) == words
+        assert sum(len(rotations(pattern, step)) for pattern in result) == len(words)
         # a pattern is even if numbers of firings within windows of one length differ by one at most
         for word in words:
             counts = [

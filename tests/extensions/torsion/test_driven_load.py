@@ -95,9 +95,9 @@ def test_a_load_on_a_branch_meets_the_dense_equations(output: str | None, states
     q = np.linalg.solve(matrix, drive)
     belt = next(k for k, section in enumerate(chain.sections) if section.name == "pulley - generator")
     expected = ratios["generator"] * (q[sizes.index("pulley")] - q[sizes.index("generator")])
-    found, before = twist(problem.engine, at).at(order)[belt], twist(plain, at).at(order)[belt]
-    assert abs(found - before) > 0.02 * abs(found)
-    assert found == pytest.approx(expected, rel=3e-3)
+    result, before = twist(problem.engine, at).at(order)[belt], twist(plain, at).at(order)[belt]
+    assert abs(result - before) > 0.02 * abs(result)
+    assert result == pytest.approx(expected, rel=3e-3)
     assert isinstance(shaft_torque(problem.engine, at), Spectrum)
 
 

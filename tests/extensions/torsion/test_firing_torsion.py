@@ -65,10 +65,10 @@ def test_every_firing_order_is_ranked(every: dict[tuple[int, ...], float]) -> No
     """Compare the ranking of all 24 firing orders by pairs of throws with the exact model; the best is proven."""
     result = laufruhe.solve(problem_of(tables(phasing={"best": 24})))
     assert result.status is Status.OPTIMAL
-    found = ranked(result)
+    actual = ranked(result)
     # an order and its mirror in time are two designs
-    assert len(found) == 24
-    for order, value in found.items():
+    assert len(actual) == 24
+    for order, value in actual.items():
         assert value == pytest.approx(every[order], rel=1e-9)
     assert result.objective.value == pytest.approx(min(every.values()), rel=1e-12)
     assert result.certificate.kind is Proof.GLOBAL
@@ -186,8 +186,8 @@ def test_the_engine_seen_from_behind() -> None:
     star_problem_of = problem.phasing.problem_of
 
     def turned(candidate: Any) -> Problem:
-        found = star_problem_of(candidate)
-        return replace(found, engine=found.engine.with_extra(behind))
+        result = star_problem_of(candidate)
+        return replace(result, engine=result.engine.with_extra(behind))
 
     phasing = replace(problem.phasing, problem_of=turned)
     again = laufruhe.solve(replace(turned_problem(problem, behind), phasing=phasing))

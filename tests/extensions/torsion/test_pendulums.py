@@ -25,13 +25,13 @@ RPM = 30.0 / math.pi
 def dynamic(chain: Torsion, order: float, speed: float) -> np.ndarray:
     """Return K - (h w)^2 J of discs and rings, a pendulum on the spring J (n w)^2, by hand."""
     names = [disc.name for disc in chain.discs] + [absorber.name for absorber in chain.absorbers]
-    found = np.diag([-part.inertia * (order * speed) ** 2 for part in (*chain.discs, *chain.absorbers)])
+    result = np.diag([-part.inertia * (order * speed) ** 2 for part in (*chain.discs, *chain.absorbers)])
     links = [(names[k], names[k + 1], section.stiffness) for k, section in enumerate(chain.sections)]
     links += [(a.on, a.name, a.stiffness + a.inertia * (a.order * speed) ** 2) for a in chain.absorbers]
     for one, other, stiffness in links:
         a, b = names.index(one), names.index(other)
-        found[np.ix_([a, b], [a, b])] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return found
+        result[np.ix_([a, b], [a, b])] += stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return result
 
 
 def zeros(chain: Torsion, order: float, maximum: float) -> list[float]:

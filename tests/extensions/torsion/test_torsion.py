@@ -56,10 +56,10 @@ def five() -> tuple[Engine, OperatingPoint]:
 
 def test_two_discs() -> None:
     """w^2 = k (J1 + J2) / (J1 J2)."""
-    found = natural_modes(chain([0.3, 0.05], [2e5]))
-    assert found.frequencies == pytest.approx([math.sqrt(2e5 * 0.35 / (0.3 * 0.05)) / math.tau], rel=1e-13)
+    result = natural_modes(chain([0.3, 0.05], [2e5]))
+    assert result.frequencies == pytest.approx([math.sqrt(2e5 * 0.35 / (0.3 * 0.05)) / math.tau], rel=1e-13)
     # the node divides the shaft as the inertias do
-    assert found.shapes[:, 0] == pytest.approx([0.05 / 0.3, -1.0])
+    assert result.shapes[:, 0] == pytest.approx([0.05 / 0.3, -1.0])
 
 
 def test_three_discs() -> None:
@@ -89,11 +89,11 @@ def test_modes_are_those_of_the_generalised_eigenproblem(seed: int) -> None:
         stiffness[k : k + 2, k : k + 2] += section.stiffness * np.array([[1, -1], [-1, 1]])
     stiffness[np.ix_([0, count], [0, count])] += 3e3 * np.array([[1, -1], [-1, 1]])
     squares, shapes = eigh(stiffness, inertia)
-    found = natural_modes(own)
-    assert found.frequencies == pytest.approx(np.sqrt(squares[2:]) / math.tau, rel=1e-9)
+    result = natural_modes(own)
+    assert result.frequencies == pytest.approx(np.sqrt(squares[2:]) / math.tau, rel=1e-9)
     for mode in range(count - 1):
         theirs = shapes[:, mode + 2]
-        ours = np.concatenate([found.shapes[:, mode], found.rings[:, mode]])
+        ours = np.concatenate([result.shapes[:, mode], result.rings[:, mode]])
         assert abs(ours @ inertia @ theirs) == pytest.approx(math.sqrt(ours @ inertia @ ours), rel=1e-9)
         assert np.abs(ours).max() == pytest.approx(1.0)
 

@@ -149,7 +149,7 @@ def test_dampers_take_values_by_the_names_that_results_show() -> None:
     problem = laufruhe.load(PROBLEMS / "inline-five-damper.toml")
     for decision in problem.decisions:
         value = 0.3 * decision.lower + 0.7 * decision.upper
-        found = problem.with_values({decision.name: f"{value!r} {decision.unit}"})
-        moved = {d.name: d.start for d in found.decisions}
+        result = problem.with_values({decision.name: f"{value!r} {decision.unit}"})
+        moved = {d.name: d.start for d in result.decisions}
         assert moved.pop(decision.name) == pytest.approx(value, rel=1e-12)
         assert moved == {d.name: d.start for d in problem.decisions if d is not decision}
