@@ -1,4 +1,4 @@
-"""Objectives as functions of couples against the exact model: every star of small engines, many of long ones (S48)."""
+"""Objectives as functions of couples, compared with the exact model: all stars of small engines (S48)."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def even_stars(family: Family) -> Stars:
 @pytest.mark.slow
 @pytest.mark.parametrize(("cylinders", "cycle", "name", "gas"), CASES)
 def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_path):
-    """Values are no more than those of the cycle and near them; what is worth as little lies in the window."""
+    """Check that values are at most those of the cycle and near them, and that windows hold all better stars."""
     problem, family = problem_of_norm(tmp_path, cylinders, cycle, name, gas)
     own, stars = norms_of(problem, family), even_stars(family)
     assert own is not None
@@ -116,7 +116,7 @@ LENGTHS = [(11, "mean", False), (12, "maximum", True), (15, "mean", False)]
 
 @pytest.mark.parametrize(("cylinders", "name", "gas"), first_fast(LENGTHS, 0, 2))
 def test_long_cranks_are_proven(cylinders, name, gas, tmp_path):
-    """No star drawn, and no exchange of the best one, is under what was proven."""
+    """Check that no drawn star, and no exchange of the best one, is below the bound."""
     problem, family = problem_of_norm(tmp_path, cylinders, "two-stroke", name, gas)
     result = solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
@@ -138,7 +138,7 @@ def test_blocks_are_stars(phases):
 @pytest.mark.slow
 @pytest.mark.parametrize("throws", [35, 45])
 def test_blocks_leave_no_couple_of_many_throws(throws, tmp_path):
-    """Each throw on a step of its own, and nothing is left of any order."""
+    """Check that each throw on its own step leaves no couple of any order."""
     problem, _ = problem_of_norm(tmp_path, throws, "two-stroke", "mean", False)
     result = solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
@@ -154,7 +154,7 @@ def test_starts_are_stars_of_the_space(tmp_path):
 
 @pytest.mark.parametrize("norm", ["mean", "maximum", "rms"])
 def test_a_plane_meets_its_term_and_is_nowhere_over_it(norm):
-    """w N(V0 + C) of random couples by its definition, a weight far from one."""
+    """Check w N(V0 + C) of random couples by its definition, with a weight far from one."""
     r, weight, rows, orders = np.random.default_rng(8), 0.2, 12, 2
     constant, couples = r.normal(size=(rows, 3)), r.normal(size=(2 * orders, rows, 3))
     grid = Grid(np.full(rows, 1.0 / rows), rows)

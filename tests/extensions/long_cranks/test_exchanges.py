@@ -1,4 +1,4 @@
-"""Exchanges of throws lead to the stars that cuts prove (S44)."""
+"""Exchanges of throws, compared with the stars that cuts prove (S44)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from phasing.test_designs import CASES, TWO_SHAFTS, model_of
 
 @pytest.mark.parametrize("cylinders", [4, 5])
 def test_exchanges_reach_what_cuts_prove(tmp_path, monkeypatch, cylinders):
-    """Exchanges decide cranks that no list holds; a bound of theirs holds for the optimum that cuts prove."""
+    """Check that exchanges find the proven optimum, and that their bound is not above it."""
     rest = engines.MOUNTS + engines.WEIGHTS + TWO_SHAFTS + engines.MOUNT_FORCE.replace("mean", "rms")
     problem = engines.problem(tmp_path, cylinders, phasing="best = 1\nmost_shafts = 1", rest=rest)
     proven = solve(problem)

@@ -1,4 +1,4 @@
-"""Cranks of so many throws that no list holds their stars, and no norm by order ranks them (S46)."""
+"""Cranks with too many throws for a list of stars or a ranking by order (S46)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def long(folder: Path, cylinders: int, cycle: str, norm: str, seconds: float = 3
 @pytest.mark.slow
 @pytest.mark.parametrize(("cylinders", "norm"), [(16, "mean"), (24, "maximum"), (48, "mean"), (32, "peak to peak")])
 def test_pairs_of_throws_leave_what_every_even_star_has(cylinders: int, norm: str, tmp_path: Path) -> None:
-    """Front and back alike: proven without a program; of 40 other stars none is under the bound."""
+    """Check a proof without a program for throws alike at front and back; 40 other stars are not below it."""
     problem, family = long(tmp_path, cylinders, "four-stroke", norm)
     result = solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
@@ -68,7 +68,7 @@ def test_a_long_crank_is_good_where_a_program_has_no_time(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_twelve_open_throws_with_weights_opposite_each() -> None:
-    """No program has weights that turn with open throws; exchanges find a crank without a couple, and it is proven."""
+    """Check that exchanges find a crank without a couple, which is proven without a program."""
     text = changed(changed(FOUR, "cylinders = 4", "cylinders = 12"), 'mass = { between = ["0 kg", "1 kg"] }\n', "")
     text = changed(changed(text, "angle = { between = [0, 360] }\n", ""), "opposite_throw = 1\n",
                    "balance_factor = { between = [0, 1] }\n")  # fmt: skip

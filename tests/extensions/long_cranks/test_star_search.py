@@ -1,4 +1,4 @@
-"""Halves that meet find what looking at every star finds, for every objective offered."""
+"""Search of stars by halves, compared with a list of all stars, for every objective."""
 
 import itertools
 from concurrent.futures import ThreadPoolExecutor
@@ -98,7 +98,7 @@ def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
 
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_no_star_below_a_value_is_left_out(name):
-    """Half of all 720 stars are below the median, and all of them meet in its window."""
+    """Check that the window of the median holds the better half of all 720 stars."""
     space, objective = replace(whole(7), mirror=False, reflect=False), OBJECTIVES[name]
     every = np.array([(0, *rest) for rest in itertools.permutations(range(1, 7))], dtype=np.uint8)
     values = objective.values(space, every)
@@ -112,7 +112,7 @@ def test_no_star_below_a_value_is_left_out(name):
 @settings(max_examples=12)
 @given(st.integers(0, 10**6), st.sampled_from([(1,), (2,), (1, 2), (2, 3)]), st.floats(-4.0, 1.0))
 def test_rearranged_throws_meet_in_every_star_of_a_window_and_no_other(seed, orders, width):
-    """Seven of nine throws on places of any distance: all 5040 arrangements are tried for comparison."""
+    """Compare seven of nine throws at any distances with all 5040 arrangements."""
     r = np.random.default_rng(seed)
     steps = np.concatenate([[0], r.permutation(np.repeat(np.arange(5), [1, 2, 2, 2, 1]))]).astype(np.uint8)
     space = StarSpace(5, ((2, 2, 2, 2, 1),), tuple(r.normal(size=9)))
@@ -147,7 +147,7 @@ def test_some_throws_are_arranged_in_every_order(throws):
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("reflect", [False, True])
 def test_one_division_of_each_set_of_images_is_left(throws, mirror, reflect):
-    """Divisions that turn into each other by steps, or by images of their stars, are counted by plain sets."""
+    """Compare the divisions, up to steps and images of their stars, with plain sets."""
     for whole_space in (whole(throws), *((in_pairs(throws),) if throws % 2 == 0 else ())):
         space = replace(whole_space, mirror=mirror, reflect=reflect)
         count, front = space.patterns[0][0], throws // 2
@@ -162,7 +162,7 @@ def test_one_division_of_each_set_of_images_is_left(throws, mirror, reflect):
 
 
 class Clock:
-    """Seconds that pass with each look at the clock."""
+    """Clock that advances with each reading."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -175,7 +175,7 @@ class Clock:
 @settings(max_examples=8)
 @given(st.integers(1, 60), st.sampled_from(sorted(OBJECTIVES)))
 def test_looking_at_every_star_ends_with_the_time(seconds, name):
-    """The best of the stars looked at is kept, and the bound holds for all: no clock of the machine is asked."""
+    """Check that a search out of time keeps the best star, and the bound holds for all."""
     space, objective = whole(9), OBJECTIVES[name]
     every = enumerate_stars(space, objective, 3)
     with pytest.MonkeyPatch.context() as patched:
@@ -199,7 +199,7 @@ def test_enumeration_looks_at_more_stars_in_more_time(monkeypatch):
 
 
 def test_cranks_with_halves_too_long_to_list_are_rearranged_while_time_is_left(monkeypatch):
-    """More time is used, and its stars are no worse; the bound is that of all stars."""
+    """Check that more time gives no worse star, with the bound of all stars."""
     monkeypatch.setattr(star_search, "LONGEST_HALF", 5)
     monkeypatch.setattr(star_search, "REARRANGED", (4, 6))
     space, objective, found = whole(13), OBJECTIVES["rms of four"], []
@@ -225,7 +225,7 @@ def test_a_search_out_of_time_claims_no_proof():
 
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_in_pieces_it_finds_the_same_whoever_works(name, monkeypatch):
-    """Rounds of pieces end at the same bits on one worker and on three, and at the proven best."""
+    """Check equal bits on one worker and on three, and the proven best star."""
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
     monkeypatch.setattr(star_search, "PIECES", 5)
     space, objective = whole(8), OBJECTIVES[name]
@@ -253,7 +253,7 @@ def test_in_pieces_it_stops_in_time(monkeypatch):
 @pytest.mark.parametrize("throws", [16, 40])
 @pytest.mark.parametrize("name", ["rms of four", "with force"])
 def test_long_cranks_without_couples_need_no_search(throws, name):
-    """Throws in pairs, front and back alike, leave nothing: no star can have less, however many there are."""
+    """Check that throws in pairs, alike at front and back, leave no load in any number."""
     space = in_pairs(throws)
     result = search_stars(space, OBJECTIVES[name], 8, time_limit=10.0)
     assert result.complete
@@ -264,7 +264,7 @@ def test_long_cranks_without_couples_need_no_search(throws, name):
 
 @pytest.mark.parametrize("throws", [6, 14, 48])
 def test_a_search_that_nothing_is_left_of_ends(throws):
-    """Forces alone, which even pairs cancel: every star is as good as the next, in pieces or not."""
+    """Check forces alone, which even pairs cancel, so that all stars are equal."""
     forces = StarAmplitudes((1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)),))
     result = search_stars(in_pairs(throws), forces, 1, time_limit=10.0)
     assert result.complete

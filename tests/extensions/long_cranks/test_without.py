@@ -1,4 +1,4 @@
-"""Without the folder cranks of few stars are decided by lists, and longer ones are refused by one line."""
+"""Cranks without the folder: few stars are decided by lists, longer cranks are refused by one line."""
 
 from __future__ import annotations
 

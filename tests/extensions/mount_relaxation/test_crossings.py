@@ -1,4 +1,4 @@
-"""Spring forces bound mounts beside stars, beside sizes, and beside other terms of an objective."""
+"""Bounds by spring forces of mounts with stars, with sizes, and with further terms of an objective."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mounts.test_mount_stars import parts
 
 @pytest.mark.slow
 def test_stars_have_a_bound(tmp_path: Path) -> None:
-    """Values are held to exact models where the core is tested."""
+    """Check the bound of open stars; tests of the core compare the values with exact models."""
     result = laufruhe.solve(problem_of(tmp_path, *parts()))
     assert result.certificate is not None
     assert result.objective is not None
@@ -30,7 +30,7 @@ def test_stars_have_a_bound(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_forces_beside_other_terms_are_bounded_by_themselves(tmp_path: Path) -> None:
-    """A sum of forces of mounts, of the block and of stiffness is not under what each of them is at least."""
+    """Check that the bound of a sum of mount force, block force and stiffness is at least the sum of the bounds."""
     problem = joint_problem(tmp_path, "rms")
     shaken = Measure(channels.SHAKING_FORCE, NORMS["rms"])
     terms = (*problem.objective, Term(shaken, 0.1), Term(Measure(channels.TOTAL_STIFFNESS), 1e-5))

@@ -1,4 +1,4 @@
-"""Dampers of mounts that turn and move: no design of a box is under its bound (E66)."""
+"""Bounds of dampers of mounts that turn and move, compared with designs of boxes (E66)."""
 
 from __future__ import annotations
 

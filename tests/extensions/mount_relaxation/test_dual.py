@@ -1,4 +1,4 @@
-"""A program over cones, by its dual: x and z keep the conditions and meet, whatever was solved before."""
+"""Cone programs by their dual: x and z are feasible and meet, independent of earlier solves."""
 
 from typing import Any
 
@@ -19,13 +19,13 @@ ENTRIES = SIZE * (SIZE + 1) // 2
 
 
 def spoilt(cones: ConeProgram, z: np.ndarray, by: float, noise: float, generator: Any) -> np.ndarray:
-    """Multipliers of each cone off by a factor, and by as much as they are large."""
+    """Return the multipliers of each cone off by a factor, and by their own size."""
     parts = np.split(z, np.cumsum([*map(len, cones.right)])[:-1])
     return np.concatenate([m * generator.uniform(0.0, by) + noise * generator.normal(size=m.shape) for m in parts])
 
 
 class Program:
-    """Numbers between -1 and 1, two matrices of trace one that equations bind, and a length under a number."""
+    """Program with numbers between -1 and 1, two matrices of trace one in equations, and a bounded length."""
 
     def __init__(self, seed: int) -> None:
         generator = np.random.default_rng(seed)
@@ -84,7 +84,7 @@ def test_an_answer_does_not_depend_on_those_before() -> None:
 
 
 def test_a_root_is_proven_above_all_its_lengths() -> None:
-    """Three lengths that nothing open changes."""
+    """Check three lengths without an open number."""
     rows = np.random.default_rng(5).normal(size=(3, 2, 1))
     root = RootTerm(1.0, 0.1, 5.0, ((0, rows),))
     program = SdpProgram((1,), (0.0,), 1, 0, np.zeros(1), np.array([25.0]), (), (), (), (root,), (), np.zeros(1))

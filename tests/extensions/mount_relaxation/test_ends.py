@@ -1,4 +1,4 @@
-"""Ends of sides of boxes: those of their own program and box, whatever was bounded before."""
+"""Ends of sides of boxes, independent of earlier bounds."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +16,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 
 @pytest.mark.slow
 def test_aims_are_those_of_their_own_program_and_box() -> None:
-    """Whatever was stated, or looked at, before."""
+    """Check that earlier statements and searches change no aim."""
     problem = decoupled(2)
     best, minimum = min(designs_about(problem, NEAR[:2], 6), key=lambda pair: pair[1])
     boxes, anew = (SdpRelaxation(problem, 1.02 * minimum, 1e-3, best.tolist()) for _ in range(2))
@@ -45,7 +45,7 @@ def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -
 
 @pytest.mark.parametrize("known", [None, (0.5, np.zeros(2))])
 def test_every_relaxation_of_a_box_counts_once(known: tuple[float, np.ndarray] | None) -> None:
-    """A relaxation that was solved before counts too, and is solved once."""
+    """Check that a relaxation solved before counts, and is solved once."""
     solved = []
 
     def bound(*ends: np.ndarray) -> tuple[float, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Limits of decoupling in the relaxation of spring forces: no design that keeps them is left out (E56, E59)."""
+"""Limits of decoupling in the relaxation of spring forces, which exclude no feasible design (E56, E59)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DECOUPLED = {"limit": "kinetic-energy decoupling", "motions": ["bounce", "roll"]
 
 
 def decoupled(opened: int, turned: bool = False) -> Problem:
-    """So many springs of the powertrain open, bounce and roll each with half of a mode at least."""
+    """Return the powertrain with so many open springs, bounce and roll each with half of a mode at least."""
     tables = powertrain("2", "4 Hz", opened)
     tables["constraints"].append(dict(DECOUPLED))
     tables["search"] = {"boxes": 8, "starts": 4}
@@ -40,7 +40,7 @@ def sides(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_every_mode_is_in_its_shapes(turned: bool) -> None:
-    """Its moments and those of every s times these keep all conditions of a box that it is in."""
+    """Check that moments of modes, and every s times these, meet all conditions of a box around them."""
     problem, generator = decoupled(9, turned), np.random.default_rng(3)
     low, high = sides(problem)
     for _ in range(12):
@@ -73,7 +73,7 @@ def test_every_mode_is_in_its_shapes(turned: bool) -> None:
 
 
 def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[np.ndarray, float]]:
-    """Designs that keep all limits, and what they are worth."""
+    """Return designs that keep all limits, and their values."""
     generator, evaluation, found = np.random.default_rng(5), evaluate(problem), []
     low, high = sides(problem)
     while len(found) < count:
@@ -88,7 +88,7 @@ NEAR = np.array([90e3, 40e3, 110e3, 60e3])
 
 
 def test_sides_hold_whatever_a_solver_proposes() -> None:
-    """Least s and least w of all designs that are better than one, by multipliers at random too."""
+    """Check least s and least w of all better designs, with random multipliers too."""
     problem, generator = decoupled(4), np.random.default_rng(11)
     designs = designs_about(problem, NEAR, 12)
     best, minimum = min(designs, key=lambda pair: pair[1])
@@ -113,14 +113,14 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
 
 
 def of_mode(mode: ModeConstraints, count: int) -> SdpProgram:
-    """A program of one mode and numbers alone."""
+    """Return a program of one mode and numbers alone."""
     none = np.zeros(0)
     return SdpProgram((1,), (0.0,), count, 0, none, none, (), (), (), (), (mode,), np.zeros(count))
 
 
 @pytest.mark.parametrize("size", [1.0, 0.1, 0.0])
 def test_the_bound_of_a_mode_is_under_its_lagrangian(size: float) -> None:
-    """Random conditions and multipliers, for coordinates w in the unit ball and numbers s between -1 and 1."""
+    """Check random conditions and multipliers for w in the unit ball and s between -1 and 1."""
     r, count, d = np.random.default_rng(6), 2, 6
     for _ in range(20):
         square = r.normal(size=(3, 3, 1 + count, d, d))
@@ -144,7 +144,7 @@ def test_the_bound_of_a_mode_is_under_its_lagrangian(size: float) -> None:
 
 @pytest.mark.slow
 def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly() -> None:
-    """And what is proven of the whole is not over the best of them."""
+    """Check narrowed boxes and dropped halves against better designs, and the bound of the whole."""
     problem = decoupled(4)
     designs = designs_about(problem, NEAR, 60)
     best, minimum = min(designs, key=lambda pair: pair[1])
@@ -160,7 +160,7 @@ def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
-    """Nothing mode_scores where all are; what those of s and those of w add is never taken off each other."""
+    """Check that scores of s and of w add up, and vanish for products of the means."""
     rng, numbers, d = np.random.default_rng(seed), 3, 6
     shapes = ModeConstraints((), rng.normal(size=(4, 1 + numbers, d, d)), rng.normal(size=(2, 1 + numbers, d, d)))
     cones = ConeProgram(of_mode(shapes, numbers))

@@ -1,4 +1,4 @@
-"""Bounds by spring forces of hydraulic mounts, of damping that follows stiffness, and of springs in one place."""
+"""Bounds by spring forces: hydraulic mounts, damping that follows stiffness, several springs in one place."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from prove.test_subdivision import boxes
 
 
 def ratio(problem: Problem, low: np.ndarray, high: np.ndarray) -> float:
-    """Return the bound of a box over the least design seen in it; a worse design is known."""
+    """Return the bound of a box over the least design found in it."""
     minimum = min(designs(problem, low, high, 1))
     return SdpRelaxation(problem, 1.2 * minimum, 1e-4, problem.start).bound(low, high)[0] / minimum
 

@@ -59,7 +59,7 @@ def test_no_stiffness_of_a_box_is_outside_of_what_is_known(tmp_path: Path, place
 
 
 def test_mounts_that_mirror_each_other_move_in_two_halves(tmp_path: Path) -> None:
-    """Fore and aft, up and pitch; aside, roll and yaw: their stiffness has the same principal values together."""
+    """Check that the halves (fore and aft, up, pitch; aside, roll, yaw) have the principal values of the whole."""
     whole = known(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS))
     parts = split_mounts(whole)
     assert [part.size for part in parts] == [3, 3]
@@ -101,7 +101,7 @@ def test_a_forbidden_band_of_total_stiffness_is_a_share_of_its_limit(tmp_path: P
 
 @pytest.mark.parametrize("seed", range(3))
 def test_columns_of_unbalances_reach_from_minus_one_to_one(seed: int) -> None:
-    """An interval that is far from zero, one about it, a disc and a sector: every set holds all that is allowed."""
+    """Check that intervals, a disc and a sector hold all allowed values."""
     random = np.random.default_rng(seed)
     sets = [Interval(0.3, 0.5), Interval(-0.2, 0.1), Sector(0.4, (0.0, math.tau)), Sector(0.4, (0.2, 1.4))]
     domains, start = [], 0

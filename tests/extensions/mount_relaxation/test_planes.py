@@ -25,7 +25,7 @@ def planes(generator: np.random.Generator, count: int) -> list[PlaneStiffness]:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_whole_box_is_reached(seed: int) -> None:
-    """Some stiffnesses and angles reach every end."""
+    """Check that some stiffnesses and angles reach every end."""
     for plane in planes(np.random.default_rng(seed), 20):
         whole = plane.full_box
         ends = np.stack(np.meshgrid(*zip(plane.low, plane.high, strict=True)), axis=-1).reshape(-1, 2)

@@ -17,7 +17,7 @@ from laufruhe.solvers import solve
 @pytest.mark.parametrize("lacking", [0.0, -1e-9, 5e-324, 1e-310])
 @pytest.mark.parametrize("size", [5e-324, 1e-305, 1.0, 1e9, 1e300])
 def test_scores_are_finite_without_a_lack(lacking: float, size: float) -> None:
-    """Zero and the least numbers there are: no share overflows, which would be an error here, nor is one lost."""
+    """Check zero and the least floats: no share overflows or is lost."""
     hidden = size * np.array([0.0, 0.5, 1.0])
     for pull in (np.zeros(3), np.array([5e-324, 0.0, 0.0])):
         result = joint_scores(pull, hidden, lacking)
@@ -72,7 +72,7 @@ min = "1.5 Hz"
 
 
 def test_a_half_of_the_motions_may_have_nothing_open() -> None:
-    """Sideways, roll and yaw go together: the upright half of them has given stiffness alone."""
+    """Check a half of upright motions with given stiffness alone."""
     problem = load(tomllib.loads(SIDEWAYS))
     result, given = solve(problem), evaluate(problem)
     assert result.certificate is not None

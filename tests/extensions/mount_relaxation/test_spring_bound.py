@@ -73,7 +73,7 @@ POWERTRAIN = PROBLEMS / "powertrain-least-force.toml"
 def designs_of(
     problem: Problem, low: np.ndarray, high: np.ndarray, count: int, seed: int
 ) -> Iterator[tuple[Any, float]]:
-    """Random designs of a box that keep every limit, and what they are worth."""
+    """Return random designs of a box that keep every limit, and their values."""
     generator, evaluation = np.random.default_rng(seed), evaluate(problem)
     for share in generator.random((count, len(low))):
         x = low + share * (high - low)
@@ -83,7 +83,7 @@ def designs_of(
 
 
 def relaxation_of(problem: Problem) -> SdpRelaxation:
-    """Boxes about the design as given."""
+    """Return the relaxation around the initial design."""
     return SdpRelaxation(problem, objective_value(problem, evaluate(problem)), 1e-3, problem.start)
 
 
@@ -151,7 +151,7 @@ def matrices_of(mounts: OpenMounts, mounting: Any, spring: Any) -> tuple[np.ndar
 
 
 def numbers_of(whole: OpenMounts, mounting: Any) -> np.ndarray:
-    """s of a design."""
+    """Return s of a design."""
     numbers = np.full(whole.numbers, np.nan)
     for spring in whole.springs:
         given, middles = matrices_of(whole, mounting, spring)
@@ -172,7 +172,7 @@ def numbers_of(whole: OpenMounts, mounting: Any) -> np.ndarray:
 
 
 def designs_in(generator: np.random.Generator, boxes: SdpRelaxation, about: np.ndarray, count: int) -> Any:
-    """Boxes of every size, of planes about what a design has in them, and a design in each."""
+    """Yield boxes of every size, of planes around a design too, and a design in each."""
     own = slice(len(about))
     for _ in range(count):
         share = generator.choice([1.0, 0.3, 0.05])
@@ -186,7 +186,7 @@ def designs_in(generator: np.random.Generator, boxes: SdpRelaxation, about: np.n
 
 
 def in_planes(boxes: SdpRelaxation, x: np.ndarray) -> np.ndarray:
-    """K11, K22 and K12 of a design in the plane of the first mount that turns, and those of its dampers (E63, E66)."""
+    """Return K11, K22 and K12 of a design in the plane of the first turned mount, with its dampers (E63, E66)."""
     found, (low, high) = [np.zeros(0)], number_ranges(boxes.problem)
     own = number_ranges(boxes.problem, x, x)[0]
     for kind, *_ in boxes._planes:
@@ -207,7 +207,7 @@ GIVEN = 'stiffness = ["200 N/mm", "300 N/mm", "700 N/mm"]'
 
 
 def tractor(name: str) -> str:
-    """The ready tractor, one mount of which turns and one moves, with dampers."""
+    """Return the ready tractor with dampers, one turned mount and one moved mount."""
     text = POWERTRAIN.with_name("tractor-four-elastic.toml").read_text(encoding="utf-8")
     front, rear = text.split('name = "rear left"')
     if name == "damped alike":
@@ -227,8 +227,10 @@ DAMPED_TRACTORS = ["dampers that follow", "dampers of their own", "dampers that 
 
 @pytest.mark.parametrize("name", ["stiffness", "all", "damped alike", *DAMPED_TRACTORS])
 def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """E42, E43, E52, E53, E57: motion, forces and travel by solving anew, and no condition broken, with turned and
-    moved mounts and unbalances open too; of all motions, and of both halves where mounts mirror each other."""
+    """Check that motion, forces and travel of random designs break no condition (E42, E43, E52, E53, E57).
+
+    Turned and moved mounts and unbalances are open too; all motions, and both halves if mounts mirror each other.
+    """
     monkeypatch.setattr(orders_, "OMITTED_SYMMETRY", -1.0)
     plain = stiffness_problem(tmp_path, OBJECTIVES["narrowed"], mounts=TURNED) if name == "stiffness" else None
     (tmp_path / "four.toml").write_text(tractor(name), encoding="utf-8")
@@ -278,7 +280,7 @@ OWN = 'damping = ["900 N s/m", "900 N s/m", "500 N s/m"]\n'
 def test_dampers_of_mounts_that_turn_or_move_are_followed_where_they_are_given(
     springs: str, follows: bool, tmp_path: Path
 ) -> None:
-    """E66."""
+    """Check E66 with given dampers."""
     text = POWERTRAIN.with_name("tractor-four-elastic.toml").read_text(encoding="utf-8")
     own = ("turned    = [", f"{springs}turned    = ["), ('name = "rear left"', f'name = "rear left"\n{OWN}')
     (tmp_path / "four.toml").write_text(changed(text, *own), encoding="utf-8")
@@ -305,7 +307,7 @@ def test_mounts_that_do_not_mirror_each_other_are_bounded_whole(name: str, tmp_p
 
 
 def test_halves_in_the_mirror_add_up_and_no_norm_of_one_is_over_that_of_both() -> None:
-    """E57."""
+    """Check that halves add up and no norm of a half exceeds that of the whole (E57)."""
     generator = np.random.default_rng(2)
     members = ((0, 2), (1,), (3, 4))
     for _ in range(20):
@@ -373,7 +375,7 @@ NORMS = {"mean": 0, "rms": 0, "maximum": 0, "peak to peak": 0, "worst mean": 0}
 
 @pytest.mark.parametrize("norm", first_fast(NORMS, 1))
 def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_path: Path) -> None:
-    """A sector, an angle given and an inclination open beside two stiffnesses, and a place; every norm."""
+    """Check every norm with a sector, an angle, an inclination, a place and two stiffnesses."""
     objective = f'[objective]\nminimise = "{norm} mount force"\norders = [1, 2, 4]\n[fidelity]\nsamples = 144\n'
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOVED, BALANCED, objective + LIMITS)
     generator, given = np.random.default_rng(8), []
@@ -406,7 +408,7 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
 
 @pytest.mark.parametrize("name", ["rms", pytest.param("means", marks=pytest.mark.slow)])
 def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Multipliers at random, and none at all."""
+    """Check bounds from random multipliers, and from none."""
     problem = stiffness_problem(
         tmp_path, OBJECTIVES.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED
     )
@@ -431,7 +433,7 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
 
 
 def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
-    """E58, against sums over samples, of ellipses in space at random."""
+    """Compare E58 with sums over samples of random ellipses in space."""
     generator, samples = np.random.default_rng(5), 720
     angles = 2.0 * np.pi * np.arange(samples) / samples
     for place in (1, 2, 6):
@@ -457,7 +459,7 @@ def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
 
 
 def test_no_force_of_a_high_order_exceeds_its_line() -> None:
-    """E62: forces by solving anew, with an inclination and a place open; of both halves and of all motions."""
+    """Check E62 against forces from a new solution, with an inclination and a place open."""
     problem = load(POWERTRAIN.with_name("tractor-four-elastic.toml"))
     boxes, generator = relaxation_of(problem), np.random.default_rng(6)
     about, tight = np.array([d.real_start for d in problem.mount_decisions]), 0.0
@@ -489,7 +491,7 @@ def test_no_force_of_a_high_order_exceeds_its_line() -> None:
 
 @pytest.mark.parametrize("norm", ["rms", "mean"])
 def test_orders_that_nothing_excites_have_no_bound(norm: str, tmp_path: Path) -> None:
-    """Alone they are nothing; beside others they add nothing."""
+    """Check that orders without load have no bound alone, and add nothing to others."""
     silent = f'minimise = "{norm} mount force"\norders = [3]\noperating_points = ["idle"]'
     problem = stiffness_problem(tmp_path, silent)
     assert spring_bound(Question(problem, 0.0, 0.0, problem.start)).bound == 0.0
@@ -497,7 +499,7 @@ def test_orders_that_nothing_excites_have_no_bound(norm: str, tmp_path: Path) ->
 
 
 def powertrain(orders: str, frequency: str, opened: int) -> dict[str, Any]:
-    """The powertrain with so many of its nine stiffnesses open, its lowest natural frequency limited alone."""
+    """Return the powertrain with so many open stiffnesses, and a limit on its lowest natural frequency."""
     import tomllib
 
     tables = tomllib.loads(POWERTRAIN.read_text(encoding="utf-8"))
@@ -516,7 +518,7 @@ def powertrain(orders: str, frequency: str, opened: int) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_four_springs_are_proven_in_a_few_boxes() -> None:
-    """Expansions leave a tenth and more of this open after thousands of boxes."""
+    """Check a proof in few boxes, where expansions leave a gap of a tenth after thousands."""
     problem = load(powertrain("2 4", "7 Hz", 4))
     result = solve(problem)
     assert result.certificate is not None
@@ -532,9 +534,9 @@ def test_four_springs_are_proven_in_a_few_boxes() -> None:
 
 @pytest.mark.slow
 def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
-    """Nelder and Mead on the exact model, from far and from beside the design.
+    """Compare with Nelder-Mead on the exact model, from far and near starts.
 
-    Asked whether all designs are a tenth worse, the bound comes near to the best of them, and no further.
+    With a tenth worse as target, the bound comes near to the best design, and no further.
     """
     from scipy.optimize import minimize
 
@@ -607,7 +609,7 @@ def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_all
 
 
 def test_a_place_behind_the_middle_is_narrowed_at_both_ends(tmp_path: Path) -> None:
-    """The better designs of a grid stay, and little more, though the place is negative all over the box."""
+    """Check that narrowing keeps the better designs of a grid, and little more, for negative places."""
     fixed = MOUNTS.replace(OPEN_STIFFNESS, '"400 N/mm"').replace(
         '["-300 mm"', '[{ between = ["-400 mm", "-50 mm"], start = "-300 mm" }'
     )
@@ -625,7 +627,7 @@ def test_a_place_behind_the_middle_is_narrowed_at_both_ends(tmp_path: Path) -> N
 
 
 def test_no_response_on_hydraulic_mounts_exceeds_its_bound() -> None:
-    """Above all modes, at the stiffest corner: the load of the highest mode, and others, by solving for the motion."""
+    """Check responses above all modes, at the stiffest corner, against a new solution for the motion."""
     problem = load(POWERTRAIN.with_name("powertrain-hydraulic.toml"))
     generator, chosen = np.random.default_rng(2), tuple(range(len(problem.engine.mounts)))
     corner = np.array([d.upper for d in problem.mount_decisions])

@@ -1,4 +1,4 @@
-"""Without the folder boxes of the core bound the same designs: a wider gap, and never over the value."""
+"""Bounds of the core without the folder: a wider gap, and never above a design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Broken bounds of leads contradict a known design; without the folder leads have designs and no bound."""
+"""Broken bounds of leads, which contradict a known design, and leads without the folder, which have no bound."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Leads and unbalances that turn with them: no place of a box is under its bound, and small boxes come near (P13)."""
+"""Bounds of leads with unbalances that turn, compared with designs of boxes (P13)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RATIOS = np.array([0.5, 1.5])
 @pytest.mark.parametrize("turned", [0.0, 1.0])
 @pytest.mark.parametrize("size", [1.0, 0.3, 0.01])
 def test_no_leads_of_a_box_are_under_its_bound(size: float, turned: float, seed: int) -> None:
-    """Shafts slower and faster than the crank, up to a sixth of a turn of their own on either side."""
+    """Check shafts slower and faster than the crank, up to a sixth of their turn on either side."""
     rng, half = np.random.default_rng(seed), size * 1.1 / RATIOS
     columns = sum(domain.width for domain in DOMAINS)
     gradient, slopes, tilts = rng.normal(size=columns), rng.normal(size=2), turned * rng.normal(size=(2, 2, columns))

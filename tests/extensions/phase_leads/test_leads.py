@@ -1,4 +1,4 @@
-"""Leads of geared shafts: against scans, against masses on their ways, and what is not decided with them."""
+"""Leads of geared shafts, compared with scans and with masses on their paths, and refused input."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FEW = changed(THREE, "[objective]", "[fidelity]\nsamples = 180\n[objective]")
 
 @pytest.mark.slow
 def test_the_ready_problem_is_proven_and_the_least_of_a_scan() -> None:
-    """Forces and roll of three pistons on a beam of two mounts, from their ways: no leads of a grid have less."""
+    """Compare with forces and roll of three pistons on two mounts from their paths, over a grid of leads."""
     result = solve(problem := load(PROBLEMS / "geared-three-leads.toml"))
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
@@ -124,7 +124,7 @@ LIMIT = '[[constraints]]\nname = "c"\nlimit = "{}"\nmax = "{}"\n[objective]'
 
 
 def turned(text: str, angle: float) -> str:
-    """The machines on one crankshaft, the second throw at an angle and fired as much earlier."""
+    """Return the machines on one crankshaft, the second throw at an angle and fired earlier by it."""
     given = changed(
         text,
         "[[engine.shafts]]                       # on the axis of the first, coupled to it at an angle\n"
@@ -144,7 +144,7 @@ def turned(text: str, angle: float) -> str:
     ],
 )  # fmt: skip
 def test_the_angle_between_machines_is_the_least_of_a_scan(objective: str, tmp_path: Path) -> None:
-    """Against the same machines with throws on one crankshaft, whose loads no lead moves."""
+    """Compare with a scan of the same machines on one crankshaft without a lead."""
     text = changed(BARE, '"rms mount force"', objective)
     result = solve(loaded(tmp_path, text))
     assert result.certificate is not None
@@ -193,7 +193,7 @@ def test_on_elastic_mounts_and_over_two_turns_no_angle_is_better(tmp_path: Path)
 
 @pytest.mark.slow
 def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
-    """No angle of a scan has weights that are better, each proven by itself; one more limit is never better."""
+    """Check that no angle of a scan with its best weights is better, and a further limit is no better."""
     coarse = changed(COUPLED, "samples = 360", "samples = 120")
     problem = replace(loaded(tmp_path, coarse), tolerance=1e-3)
     result = solve(problem)
@@ -213,7 +213,7 @@ def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
 
 
 def test_a_box_near_the_best_design_is_bounded_at_all_angles(tmp_path: Path) -> None:
-    """A quarter of the angles is enough far from it; near it a peak between them counts, and no design is under it."""
+    """Check that a box far from the best design takes a quarter of the angles, a near one all."""
     text = changed(COUPLED.split("[[constraints]]")[0], '"rms mount force"', '"maximum mount force"')
     search = LeadSearch(loaded(tmp_path, text + "[fidelity]\nsamples = 96\n"))
     for low, high in np.radians([[176.0, 177.0], [150.0, 150.1]]):

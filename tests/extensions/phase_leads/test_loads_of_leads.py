@@ -1,4 +1,4 @@
-"""Leads and the torque of the driven machine: the load stays with the crankshaft."""
+"""Leads with the torque of the driven machine, which stays with the crankshaft."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from physics.test_load_torque import WORK, problem_of
 
 
 def test_leads_turn_the_engine_against_the_load() -> None:
-    """The load stays with the crankshaft, in sums of shafts (P13) and in bounds of the irregularity (P14)."""
+    """Check that the load stays in sums of shafts (P13) and in bounds of the irregularity (P14)."""
     problem = problem_of("two-machines-angle", 40.0)
     model = PhaseLeadModel(replace(problem, objective=(Term(WORK),), limits=()))
     measure = Measure(IRREGULARITY, NORMS["mean"])

@@ -1,4 +1,4 @@
-"""Leads between two cranks with gas in the chambers that both share: the bound of torques, optima, and refusals."""
+"""Leads of two cranks that share chambers with gas: bound of torques, optima, and refused input."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def between(low: float, high: float, **more: float) -> dict[str, Any]:
 
 
 def pair(ahead: float, ratio: float, rods: tuple[float, float], radii: tuple[float, float], cycle: Cycle) -> Any:
-    """Two pistons in one cylinder, the upper one ahead."""
+    """Return two pistons in one cylinder, the upper one with a lead."""
     lower = SliderCrank("lower", 0.0, radii[0], radii[0] / rods[0], 1.0, bore=0.08)
     shaft = Shaft("upper", ratio, 0.0, 1.0)
     upper = SliderCrank(
@@ -83,7 +83,7 @@ SPEEDS = [{"name": "loud", "speed": "2400 rpm", "weight": 3}, {"name": "calm", "
 
 
 def two_speeds(quantity: str) -> Problem:
-    """Each with gas of its own."""
+    """Return a problem of two operating points, each with its own gas."""
     own = problem(quantity, between(5, 40), operating_points=SPEEDS)
     loud, calm = own.points
     return replace(own, points=(loud, replace(calm, gas=replace(calm.gas, peak_pressure=60e5, imep=3e5))))
@@ -91,7 +91,7 @@ def two_speeds(quantity: str) -> Problem:
 
 @pytest.mark.parametrize("norm", ["rms", "mean", "maximum", "peak to peak"])
 def test_a_torque_changes_a_norm_by_no_more_than_its_bound(norm: str) -> None:
-    """A torque that only works at one point, or at both, with no load beside it: its norm is its change."""
+    """Compare the bound with the norm of a torque at one point or both, without another load."""
     own = two_speeds(f"{norm} roll moment")
     (measure,), random = own.measures, np.random.default_rng(4)
     boxes, weights = SharedGasBoxes(own), (0.75, 0.25)
@@ -113,7 +113,7 @@ def test_a_torque_changes_a_norm_by_no_more_than_its_bound(norm: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["rms mount force", "maximum roll moment", "peak to peak mount force"])
 def test_no_lead_of_a_box_is_under_its_bound(quantity: str) -> None:
-    """And of narrow boxes the bound is near the value."""
+    """Check bounds of boxes, which are tight for narrow ones."""
     own = two_speeds(quantity)
     boxes = SharedGasBoxes(own)
     for middle, half in ((10.0, 1.0), (25.0, 8.0), (30.0, 0.01)):
@@ -156,7 +156,7 @@ def test_no_lead_is_better_than_the_bound(name: str) -> None:
 
 @pytest.mark.slow
 def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
-    """The least roll moment under a limit on the force that the lead leaves; and a limit that nothing keeps."""
+    """Check the least roll moment under a limit on the force, and a limit that no lead keeps."""
     force = [{"limit": "rms shaking force", "max": "300 N"}]
     own = problem("rms roll moment", between(0, 40), constraints=force)
     result = laufruhe.solve(own)
@@ -170,7 +170,7 @@ def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
 
 @pytest.mark.slow
 def test_gas_without_a_net_force_leaves_leads_decidable() -> None:
-    """Its forces close inside: the shaking force is decided beside weights, as without gas."""
+    """Check that gas, whose forces cancel, leaves the shaking force as without gas."""
     tables = {key: READY[key] for key in ("counterweights",)}
     with_gas, without = (
         laufruhe.solve(problem("rms shaking force", between(3, 40), **tables, **more)) for more in ({}, {"gas": None})
@@ -186,7 +186,7 @@ RIM = {"mean_diameter": "300 mm", "width": "60 mm", "height": "40 mm", "arms": A
 @pytest.mark.slow
 @pytest.mark.parametrize("start", [0, 60])
 def test_a_lead_moves_the_mean_torque_that_arms_hand_on(start: float) -> None:
-    """So a limit on their stress neither excludes every lead for the one given, nor is taken as kept for it."""
+    """Check that a limit on the stress of arms is judged at each lead, not at the initial one."""
     limit = {"limit": "arm stress", "max": "13.5 MPa"}
     more = {"flywheel": {"rim": RIM}, "operating_points": [{"speed": "300 rpm"}]}
     stress = [

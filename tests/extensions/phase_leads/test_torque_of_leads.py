@@ -1,4 +1,4 @@
-"""The largest torque that a lead is priced with: that of the cycle without its mean, from above and near."""
+"""Largest torque that bounds a lead: the torque of the cycle without its mean, from above."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def read(tmp_path: Path) -> Read:
 
 
 def every(problem: Problem) -> list[float]:
-    """The objective of all assemblies, by the exact model."""
+    """Return the objective of all assemblies by the exact model."""
     own = problem.extra(Assembly)
     assert own is not None
     lots, cylinders = own.lots, len(problem.engine.slider_cranks)
@@ -134,7 +134,7 @@ def test_an_assembly_with_open_numbers_is_refused(read: Read) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_part_of_the_search_is_left_out_that_holds_the_best(seed: int) -> None:
-    """Norms of random rows: a search that keeps the parts it should leave out misses the best of all assemblies."""
+    """Compare value and bound of the search on random rows with all assemblies."""
     rng = np.random.default_rng(seed)
     cylinders = 3
     grid = Grid(np.full(6, 1.0 / 6.0), 6)

@@ -1,4 +1,4 @@
-"""Tables, files and pictures of built engines and of chosen parts show what their results hold."""
+"""Tables, files and pictures of built engines and of chosen parts, compared with their results."""
 
 from __future__ import annotations
 

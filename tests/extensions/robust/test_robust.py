@@ -1,4 +1,4 @@
-"""Balance for the engines that tolerances allow: its worst case, its share, its prices."""
+"""Balance under tolerances: the worst case, the share of engines, and prices."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Problem]:
 
 @pytest.fixture(scope="module")
 def problem(read: Callable[[str], Problem]) -> Problem:
-    """Pistons, shafts and what balancing leaves are off."""
+    """Return a problem with tolerances of pistons, shafts and residual unbalance."""
     return read(TEXT + RESIDUAL + ROBUST)
 
 
@@ -77,7 +77,7 @@ def result(problem: Problem) -> Result:
 
 
 def turned(sizes: Sequence[float]) -> list[complex]:
-    """Decisions of these sizes: the unbalances of the shafts point down."""
+    """Return decisions of these sizes, with the unbalances of the shafts down."""
     return [complex(-size) for size in sizes]
 
 
@@ -114,7 +114,7 @@ def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result
 
 
 def test_no_other_design_is_better(read: Callable[[str], Problem]) -> None:
-    """A search by the exact model over every corner of the intervals, without cones or bounds."""
+    """Compare with a search by the exact model over every corner of the intervals."""
     problem = read(TEXT + ROBUST)
     result = solve(problem)
     corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))
@@ -151,7 +151,7 @@ def test_more_tolerance_is_never_better(problem: Problem, result: Result) -> Non
 
 @pytest.mark.slow
 def test_prices_are_slopes(problem: Problem, result: Result) -> None:
-    """Against other optima: every tolerance a little wider and a little narrower."""
+    """Compare prices of tolerances with optima for each a little wider and a little narrower."""
     assert isinstance(result.details, RobustResult)
     fine = replace(problem, tolerance=3e-6)
     for tolerance in result.details.tolerances[1:2]:
@@ -194,7 +194,7 @@ def test_share_of_engines(problem: Problem, result: Result) -> None:
 
 
 def limited(read: Callable[[str], Problem], maximum: float) -> tuple[Problem, _Program]:
-    """A limit of the shaking force, and the program of engines as drawn."""
+    """Return a problem with a limit of the shaking force, and the program of drawn engines."""
     limit = f'[[constraints]]\nlimit = "maximum shaking force"\nmax = "{maximum} N"\n'
     problem = read(TEXT + ROBUST + limit)
     program = _Program(problem)
@@ -220,7 +220,7 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
     angles = program.angles
 
     class Stricter(WorstCaseAdversary):
-        """Proves a little more than there is of the engine as drawn."""
+        """Adversary that proves a slightly larger violation than that of the drawn engine."""
 
         def at(self, values: Sequence[complex], proven: bool) -> WorstEngines:
             drawn = evaluate(problem, problem.design(values))
@@ -328,7 +328,7 @@ def minimise(quantity: str, samples: int = 48) -> str:
     ids=["vee", "vee, a peak", "elastic mounts", "two points", "gas"],
 )
 def test_crossed(read: Callable[[str], Problem], text: str) -> None:
-    """Proven, and no engine of a few hundred exceeds it."""
+    """Check that none of a few hundred drawn engines exceeds the proven value."""
     problem = read(text + ROBUST)
     result = solve(replace(problem, tolerance=1e-3))
     assert result.certificate is not None
@@ -341,7 +341,7 @@ def test_crossed(read: Callable[[str], Problem], text: str) -> None:
 
 
 def test_nonlinear_tolerances_are_drawn_at_random(read: Callable[[str], Problem]) -> None:
-    """Rod ratio and spacing: the worst of the engines drawn, said to be just that."""
+    """Check that tolerances of rod ratio and spacing give the worst of the drawn engines, and say so."""
     text = TEXT.replace("rod_ratio = 0.26", 'rod_ratio = "0.26 ± 5 %"').replace('"125 mm"', '"125 mm ± 1 mm"')
     problem = read(text + ROBUST + "engines = 30\n")
     result = solve(problem)
@@ -359,7 +359,7 @@ def test_nonlinear_tolerances_are_drawn_at_random(read: Callable[[str], Problem]
 
 @pytest.mark.slow
 def test_ready_problem() -> None:
-    """Proven to a thousandth."""
+    """Check a proof within a thousandth."""
     problem = load(PROBLEMS / "tractor-four-robust.toml")
     result = solve(replace(problem, tolerance=1e-3, fidelity=replace(problem.fidelity, samples=72)))
     assert worst(result) == pytest.approx(462.02, rel=1e-3)

@@ -36,7 +36,7 @@ def problem(**changes: Any) -> Problem:
 
 
 def heaviest(nominal: Problem) -> float:
-    """The objective of the engine with the heaviest piston, which is the worst, at many angles."""
+    """Return the objective of the engine with the heaviest piston, the worst one, at many angles."""
     own = with_errors(nominal, np.ones(tolerances_of(nominal).count))
     return objective_value(own, evaluate(own, samples=5760))
 
@@ -44,7 +44,7 @@ def heaviest(nominal: Problem) -> float:
 @pytest.mark.parametrize("weights", [[], [WEIGHT]], ids=["nothing open", "a weight"])
 @pytest.mark.parametrize("throw", [0, 3])
 def test_the_worst_case_is_that_of_many_angles(throw: float, weights: list[Any]) -> None:
-    """No weight moves the second order; 48 angles have 0.6 % too little of it, or a quarter of a percent too much."""
+    """Check order 2, which no weight moves and 48 angles misread by up to 0.6 %, against many angles."""
     case = problem(engine={**ENGINE, "throws": [throw]}, counterweights=weights, objective=SECOND)
     result = solve(case)
     assert result.objective is not None
@@ -81,7 +81,7 @@ def test_the_worst_of_drawn_engines_is_that_of_many_angles() -> None:
 
 
 def test_the_error_estimate_is_that_of_the_worst_engine() -> None:
-    """Samples are judged on the engine that the objective is of, not on the drawing."""
+    """Check that samples are judged on the engine of the objective, not on the drawing."""
     case = problem(counterweights=[WEIGHT], objective=SECOND)
     result = solve(case)
     assert isinstance(result.details, RobustResult)
@@ -91,7 +91,7 @@ def test_the_error_estimate_is_that_of_the_worst_engine() -> None:
 
 @pytest.mark.parametrize("rod_ratio", [0.3, "0.3 ± 3 %"], ids=["every error", "drawn"])
 def test_nothing_open_that_breaks_a_limit_in_some_engine_is_infeasible(rod_ratio: float | str) -> None:
-    """The drawing keeps it; what the limit can reach is what the worst engine has."""
+    """Check that the attainable value is that of the worst engine, while the drawing keeps the limit."""
     tables = {"engine": {**ENGINE, "rod_ratio": rod_ratio}, "robust": {"over": "worst case", "engines": 20}}
     free = problem(**tables, objective=SECOND)
     worst, drawn = solve(free), evaluate(free, samples=5760)
@@ -128,7 +128,7 @@ def test_few_angles_neither_break_nor_keep_a_limit_with_nothing_open(throw: int,
 
 
 def test_built_engines_of_the_design_as_given_may_pass_a_limit_by_a_hair() -> None:
-    """No program is known of that design, and one without angles was asked."""
+    """Check that a limit that built engines of the initial design break by a hair leaves no design."""
     case = problem(
         **{
             "engine": {
@@ -165,7 +165,7 @@ def test_time_that_is_over_leaves_no_proof_that_few_angles_alone_have(throw: flo
 def test_limits_of_built_engines_are_what_the_cycle_has_in_the_worst_of_them(
     throw: float, share: float, status: Status
 ) -> None:
-    """No weight moves the second order. The drawing is far from the limit, and tells nothing of how few angles read."""
+    """Check limits on order 2 in the worst engine, which the sampling error of the drawing does not show."""
     engine = {**ENGINE, "throws": [throw]}
     weight = {"name": "w", "x": "0 mm", "angle": 180, "radius": "1 m", "unbalance": {"between": ["0 kg m", "0.1 kg m"]}}
     limit = {"limit": "mean shaking force", "orders": [2], "name": "second"}
@@ -182,7 +182,7 @@ def test_limits_of_built_engines_are_what_the_cycle_has_in_the_worst_of_them(
 
 
 def test_a_tolerance_costs_what_a_little_less_of_it_saves() -> None:
-    """The worst piston is the heaviest, and the load of a single is in proportion to it."""
+    """Compare the price with the heaviest piston, to which the load of a single is proportional."""
     result = solve(problem(engine={**ENGINE, "throws": [2]}, objective=SECOND, fidelity={"samples": 240}))
     assert isinstance(result.details, RobustResult)
     (priced,) = result.details.tolerances

@@ -1,4 +1,4 @@
-"""Open cranks of built engines: each star by itself, and as good as each given."""
+"""Open cranks of built engines, compared with each star given by itself."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from problem_files import changed
 
 @pytest.mark.slow
 def test_the_worst_case_of_every_crank_is_that_of_the_best() -> None:
-    """Tolerances of the crank pins stand where the throws of each star are, not at those of the first."""
+    """Check that tolerances of crank pins stand at the throws of each star, not of the first."""
     text = changed(FOUR, '"0.5 kg"', '"0.5 kg ± 5 %"')
     text = changed(text, '"0.3 kg"', '"0.3 kg ± 3 %"') + "[robust]\nengines = 200\n[fidelity]\nsamples = 180\n"
     result, each = laufruhe.solve(text), solved_each(text)
@@ -27,7 +27,7 @@ def test_the_worst_case_of_every_crank_is_that_of_the_best() -> None:
 
 @pytest.mark.parametrize("found", [None, SimpleNamespace(value=3.0)])
 def test_open_cranks_keep_what_is_known_of_the_design_as_given(found: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing is told of it where no star has a design, or where it has no objective itself."""
+    """Check that the result of the stars stays as it is without an objective of its own or of the initial design."""
     problem = laufruhe.load(changed(FOUR, '"0.5 kg"', '"0.5 kg ± 5 %"') + "[robust]\nengines = 20\n")
     result = SimpleNamespace(objective=found)
     monkeypatch.setattr(solver, "solve_star_by_star", lambda *_: result)

@@ -1,4 +1,4 @@
-"""Free forces from tolerances: known sums, bounds, and the study's order of size."""
+"""Free forces from tolerances: known sums, bounds, and order of magnitude of the study."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_random_engines_stay_under_the_worst() -> None:
 
 
 def test_second_order_outweighs_the_worst_sum() -> None:
-    """The paper's 1000 against 100 kp, as an order of size: its tolerances are not printed.
+    """Check the paper's 1000 against 100 kp in order of magnitude; it prints no tolerances.
 
     Assumed: 10 g on a piston of 1.25 kg, 50 g cm on each plane, a flywheel of 30 kg centred to 0.05 mm.
     """

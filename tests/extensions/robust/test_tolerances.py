@@ -1,4 +1,4 @@
-"""Tolerances as a file writes them, what of the engine they move, and one line for what is wrong."""
+"""Tolerances of a file, the numbers of the engine that they change, and one line for bad input."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_open_unbalances_are_off_by_a_share(tmp_path: Path) -> None:
     ],
 )
 def test_numbers_of_the_file(tmp_path: Path, old: str, new: str, scale: float) -> None:
-    """An engine with an error of such a number is the engine of a file that has it."""
+    """Compare an engine with an error of a number with the engine of a file with that number."""
     plain = TEXT.format("") + MOUNTS
     problem = read(tmp_path, plain.replace(old, new))
     unit = "" if "ratio" in old else " m"
@@ -128,7 +128,7 @@ def test_draws_stay_within(tmp_path: Path) -> None:
 
 
 def test_grades(tmp_path: Path) -> None:
-    """ISO 21940-11: G 6.3 at 3000 rpm is an eccentricity of 20 um."""
+    """Check ISO 21940-11: G 6.3 at 3000 rpm is an eccentricity of 20 um."""
     assert grade_of("G 6.3") == pytest.approx(6.3e-3)
     assert grade_of("g6.3") is None
     assert permitted_unbalance(6.3e-3, 60.0, 100.0 * math.pi) == pytest.approx(60.0 * 20.05e-6, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Bounds of built engines and of assemblies that are broken on purpose are found out."""
+"""Bounds of built engines and of assemblies that are broken on purpose, and must be detected."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from ready import solved
 
 @pytest.fixture(autouse=True)
 def whole_walks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave no step out for want of time."""
+    """Give every walk enough time for all steps."""
     monkeypatch.setattr(walk, "SECONDS", 20.0)
 
 
@@ -68,7 +68,7 @@ def test_a_broken_bounder_of_assemblies(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.slow
 def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever a search says of what is enough, its bound is that of all parts: the gap grows, and no more."""
+    """Check that a search that discards all parts still bounds the value, with a gap."""
     monkeypatch.setattr(assembly_solver._Search, "cutoff", property(lambda _: -math.inf))
     result = laufruhe.solve(PROBLEMS / "selective-assembly.toml")
     assert result.certificate is not None
@@ -79,7 +79,7 @@ def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.fixture
 def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Parts of the assemblies that may hold a better one are left out, and the others are kept."""
+    """Drop the assemblies that may hold a better one, and keep the others."""
     right = assembly_solver._Search.branch
 
     def turned(self: Any, taken: Any) -> Iterator[Any]:

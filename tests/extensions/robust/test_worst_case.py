@@ -1,4 +1,4 @@
-"""The worst errors of a design: against all corners and many angles, with bounds that nothing exceeds."""
+"""Worst errors of a design, compared with all corners and many angles, and their bounds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COLUMNS = (slice(0, 1), slice(1, 2), slice(2, 3), slice(3, 5))
 
 
 def random_norm(name: str, seed: int, share: float = 0.3) -> AffineNorm:
-    """Two signals of twelve rows in a plane, and what five numbers add."""
+    """Return a norm of two signals of twelve rows in a plane that depends on five numbers."""
     random = np.random.default_rng(seed)
     weights = random.uniform(0.5, 1.0, 24)
     slope = share * random.normal(size=(24, 2, 5))
@@ -48,7 +48,7 @@ def test_worst_of_corners_and_circles(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", NORMS)
 def test_no_errors_of_a_part_exceed_its_bound(name: str) -> None:
-    """Whole discs, arcs of them, and some intervals held."""
+    """Check bounds over whole discs, arcs of them, and with some intervals fixed."""
     random, terms = np.random.default_rng(3), [(1.0, random_norm(name, 4, 1.0))]
     whole = [ErrorBlock(own, np.eye(own.stop - own.start)) for own in COLUMNS]
     for centre, arc in whole[3].parts(np.zeros(5)):
@@ -85,7 +85,7 @@ def test_squares_lie_over_their_norm(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["mean", "rms"])
 def test_majorants_of_earlier_nodes_hold_at_all_errors(name: str) -> None:
-    """Each is exact at errors that it touches, and no lower than the norms at any others."""
+    """Check that each majorant is exact where it touches and not below the norms elsewhere."""
     random, terms = np.random.default_rng(11), [(1.0, random_norm(name, 12, 1.0)), (0.3, random_norm("mean", 13))]
     known, touched = KnownBounds(terms), random.normal(size=(6, 5))
     for z in touched:
@@ -123,7 +123,7 @@ def test_no_errors_leave_the_drawing() -> None:
 
 @pytest.mark.parametrize("name", NORMS)
 def test_intervals_alone_end_at_their_worst_corner(name: str) -> None:
-    """No part of them is left to divide, and two terms of any weights add up."""
+    """Check that no part remains to divide, and that two weighted terms add up."""
     random = np.random.default_rng(9)
     constant, slope, grid = random.normal(size=(24, 2)), random.normal(size=(24, 2, 4)), Grid(np.full(24, 1 / 24), 12)
     norms = [AffineNorm(NORMS[own], constant[::step], slope[::step], grid) for own, step in ((name, 1), ("mean", -1))]
@@ -146,7 +146,7 @@ def test_wider_errors_are_never_better() -> None:
 @pytest.mark.parametrize("discs", [1, 2])
 @pytest.mark.parametrize("name", ["mean", "maximum", "rms"])
 def test_turning_unbalances_add_up(name: str, discs: int) -> None:
-    """Alone they make the same force at every angle, wherever they point: no errors outside their discs are taken."""
+    """Check that single unbalances make the same force at every angle, within their discs."""
     phi = 2.0 * np.pi * np.arange(36) / 36
     turned = np.stack([np.stack([np.cos(phi), -np.sin(phi)]), np.stack([np.sin(phi), np.cos(phi)])]).transpose(2, 0, 1)
     slope = np.concatenate([(k + 1.0) * turned for k in range(discs)], axis=2)

@@ -1,4 +1,4 @@
-"""Ready rotary engines: curves, prices, pictures and open weights of their results."""
+"""Curves, prices, pictures and open weights of the ready rotary engines."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
 
 @pytest.mark.slow
 def test_limits_of_nothing() -> None:
-    """A couple of 1 N m that is left needs that much less of both weights; no couple is under none."""
+    """Check prices of limits of zero: 1 N m of couple saves weight, and no price exists for a tighter limit."""
     result = solve(PROBLEMS / "rotary-four-open.toml")
     prices = {limit.name: limit.price for limit in result.limits}
     speed = 8000.0 * math.tau / 60.0

@@ -1,4 +1,4 @@
-"""Rotary engine against its geometry: areas of polygons, pressures along a flank, masses moved step by step."""
+"""Rotary engine, compared with polygon areas, pressures along a flank, and masses moved step by step."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ UNIT = RotaryUnit(
 
 
 def read(text: str) -> Problem:
-    """The problem of a text."""
+    """Return the problem of a text."""
     return load_tables(tomllib.loads(text), PROBLEMS / "rotary-two.toml")
 
 
@@ -60,14 +60,14 @@ def _housing(turn: Array) -> ComplexArray:
 
 
 def _over_chord(since: float) -> float:
-    """Area between the housing and the chord of the flank that fired `since` ago [m2]."""
+    """Return the area between the housing and the chord of the flank that fired `since` ago [m2]."""
     middle = since / 3.0
     arc = _housing(np.linspace(middle - math.pi / 3.0, middle + math.pi / 3.0, 20001))
     return _area(arc)
 
 
 def test_chambers_are_what_is_between_housing_and_rotor() -> None:
-    """Y3: to the area of a polygon of 20,000 corners; the flank, whatever its shape, adds the same at every angle."""
+    """Compare Y3 with the area of a polygon of 20,000 corners; the flank adds a constant."""
     angles = np.linspace(0.0, 6.0 * math.pi, 25)
     result = chamber_volume(UNIT, angles)
     drawn = B * np.array([_over_chord(angle) for angle in angles])
@@ -77,7 +77,7 @@ def test_chambers_are_what_is_between_housing_and_rotor() -> None:
 
 @pytest.mark.parametrize("radius", [0.06, 0.105, 0.15])
 def test_the_smallest_chamber_is_that_of_the_inner_envelope(radius: float) -> None:
-    """Y2: what no angle of the housing cuts off the flank, found ray by ray from the rotor's centre."""
+    """Compare Y2 with the inner envelope of the housing, found ray by ray."""
     unit = replace(UNIT, rotor_radius=radius)
     turn = np.linspace(-math.pi / 2.0, math.pi / 2.0, 2001)
     rays = np.linspace(-math.pi / 3.0, math.pi / 3.0, 1001)
@@ -94,12 +94,12 @@ def test_the_smallest_chamber_is_that_of_the_inner_envelope(radius: float) -> No
 
 
 class TestGas:
-    """Y4, against pressures that are added up along flanks and housing."""
+    """Gas loads (Y4), compared with pressures summed along flanks and housing."""
 
     point = OperatingPoint("", SPEED, GAS)
 
     def _pressures(self, phi: float) -> list[tuple[float, float]]:
-        """Angle since each chamber fired, and what it holds over the crankcase."""
+        """Return for each chamber the angle since it fired, and its pressure above the crankcase [Pa]."""
         whole = 6.0 * math.pi
         since = [(phi + math.tau * k) % whole for k in range(3)]
         pressures = [float(pressure_at(GAS, UNIT, _of(UNIT).cycle, np.array([at]))[0]) for at in since]
@@ -132,7 +132,7 @@ class TestGas:
         assert complex(result[2], result[1]) == pytest.approx(total, rel=1e-4)
 
     def test_all_that_presses_on_block_and_shaft_leaves_the_wrench(self) -> None:
-        """Housing and bearings together: the force of eq. 13 alone, and the moment that the torque needs."""
+        """Check that housing and bearings leave the force of eq. 13 and the moment of the torque."""
         engine = read(TEXT).engine
         point = OperatingPoint("", SPEED, GAS)
         phi = np.linspace(0.0, math.tau, 37)
@@ -165,7 +165,7 @@ class TestGas:
 
 
 def _bodies(unit: RotaryUnit, phi: Array) -> tuple[Array, ComplexArray]:
-    """Twelve masses of a rotor with its mass and inertia, and where they are, shape (12, n)."""
+    """Return twelve masses with mass and inertia of a rotor, and their places, shape (12, n)."""
     corners, gyration = np.exp(2j * np.pi * np.arange(12) / 12), math.sqrt(unit.rotor_inertia / unit.rotating_mass)
     centre = unit.crank_radius * np.exp(1j * (phi + unit.throw))
     about = gyration * corners[:, None] * np.exp(1j * phi / 3.0)
@@ -174,7 +174,7 @@ def _bodies(unit: RotaryUnit, phi: Array) -> tuple[Array, ComplexArray]:
 
 @pytest.mark.parametrize("throw", [0.0, 2.0])
 def test_masses_that_are_moved_step_by_step_load_the_block_as_a_rotor(throw: float) -> None:
-    """Newton's law by differences of positions; turning about its own centre at constant speed a rotor asks nothing."""
+    """Compare with Newton's law by differences of positions."""
     unit = replace(UNIT, throw=throw, firing_angle=-throw % math.tau, x=0.2)
     phi, step = np.linspace(0.0, math.tau, 25), 1e-3
     masses, here = _bodies(unit, phi)
@@ -189,14 +189,14 @@ def test_masses_that_are_moved_step_by_step_load_the_block_as_a_rotor(throw: flo
 
 
 def test_a_rotor_adds_a_ninth_of_its_inertia_to_the_shaft() -> None:
-    """Y6: it turns at a third of the speed; its mass is one of those at the crank pin."""
+    """Check Y6: the rotor turns at a third of the speed, and its mass counts at the crank pin."""
     swing = swing_of(_of(UNIT), OperatingPoint("", SPEED, GAS), EXACT)
     np.testing.assert_allclose(swing.inertia, INERTIA / 9.0, rtol=1e-12)
 
 
 @pytest.mark.slow
 def test_an_uneven_speed_loads_the_block_through_the_teeth() -> None:
-    """Y6: the rotor gets its torque J a / 3 at the pitch circle of radius 3 e, whose fixed wheel has the radius 2 e."""
+    """Check Y6: torque J a / 3 acts at the pitch circle of radius 3 e against the wheel of radius 2 e."""
     unit, uneven = replace(UNIT, rotating_mass=0.0), replace(EXACT, crank_inertia=0.2)
     point = OperatingPoint("", 200.0, GAS)
     motion = crank_motion(_of(unit), point, uneven)
@@ -212,7 +212,7 @@ class TestWeights:
 
     @pytest.mark.parametrize("count", [1, 2, 3, 4])
     def test_weights_at_the_ends_have_one_size(self, count: int) -> None:
-        """Two planes, force and couple: the star sum alone fixes them; of all even stars the best is proven."""
+        """Check that force and couple fix two planes, and that the best even star is proven."""
         text = _ends(count)
         result = solve(read(text))
         assert str(result.certificate.kind) == "global"
@@ -229,7 +229,7 @@ class TestWeights:
         assert np.abs(wrench[:, [0, 1, 2, 4, 5]]).max() < 1e-6 * size
 
     def test_the_far_planes_of_three_are_used(self) -> None:
-        """The ready problem by linear programming: all in one plane, so that sizes are numbers with a sign."""
+        """Compare the ready problem with a linear program of signed sizes in one plane."""
         from scipy.optimize import linprog
 
         result = solve(read(TEXT))

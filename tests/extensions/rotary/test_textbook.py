@@ -15,23 +15,23 @@ from one_cylinder import rotating_loads
 
 
 class TestRotary:
-    """Chapters 2.2, 2.4, 2.5.2, 11.1: the rotary engine, at a shaft angle of the book's counting."""
+    """Chapters 2.2, 2.4, 2.5.2, 11.1: rotary engine at the book's shaft angle."""
 
     unit = RotaryUnit("rotor", 0.0, 0.015, math.inf, 0.0, rotating_mass=6.0, rotor_radius=0.105, rotor_width=0.08)
 
     def test_displacement(self) -> None:
-        """Eq. 103 prints 5.2 e R b; the factor is 3 sqrt(3)."""
+        """Check the factor 3 sqrt(3), where eq. 103 prints 5.2 e R b."""
         assert self.unit.displacement == pytest.approx(5.2 * 0.015 * 0.105 * 0.08, rel=1e-3)
 
     def test_rotating_force(self) -> None:
-        """Eq. 13, (m_k + m_e) e w^2: the free force that page 2 says there is not."""
+        """Check eq. 13, (m_k + m_e) e w^2, a free force that page 2 denies."""
         engine = Engine("rotary", Cycle.TWO_STROKE, (self.unit,))
         (force,) = np.abs(rotating_loads(engine, 600.0).coefficients[1:, 2])
         assert force == pytest.approx(6.0 * 0.015 * 600.0**2, rel=1e-12)
 
     @pytest.mark.parametrize("degrees", [0, 90, 200, 360, 700, 1000])
     def test_tangential_and_radial_force(self, degrees: int) -> None:
-        """Eqs. 21, 22: T = -F sin(2 phi/3), R = -F cos(2 phi/3) towards the shaft, phi from the largest volume."""
+        """Check eqs. 21, 22: T = -F sin(2 phi/3), R = -F cos(2 phi/3), phi from the largest volume."""
         turned = math.radians(degrees)
         push = -complex(self.unit.lean(np, turned + 1.5 * math.pi))
         # seen from the eccentric, which is turned by phi from where the chamber fires
@@ -40,7 +40,7 @@ class TestRotary:
         assert -seen.real == pytest.approx(-math.cos(2.0 * turned / 3.0), abs=1e-12)
 
     def test_torque_is_that_of_three_tangential_forces(self) -> None:
-        """Eq. 23, with chambers 2 and 3 at 360 and 720 degrees, against the work of the gas on their volumes."""
+        """Compare eq. 23, chambers at 0, 360 and 720 degrees, with the work of the gas."""
         gas = Seiliger(compression_ratio=9.0, imep=9e5, peak_pressure=5e6)
         turned = np.linspace(0.1, 6.1, 7)
         torque = np.zeros(len(turned))
@@ -54,7 +54,7 @@ class TestRotary:
 
     @pytest.mark.parametrize("degrees", [0, 77, 400, 1000])
     def test_speed_and_acceleration_of_an_apex(self, degrees: int) -> None:
-        """Eqs. 8, 9 at any angle are under the largest, which they reach where apex and eccentric are in line."""
+        """Check eqs. 8, 9 against the largest values, reached with apex and eccentric in line."""
         w, phi = 600.0, math.radians(degrees)
         speed = w * math.hypot(
             0.015 * math.sin(phi) + 0.035 * math.sin(phi / 3), 0.015 * math.cos(phi) + 0.035 * math.cos(phi / 3)

@@ -1,4 +1,4 @@
-"""Run-ups over boxes of stiffness (E65): against random designs within, SciPy, and what the derivation supposes."""
+"""Run-ups over boxes of stiffness (E65), compared with random designs, SciPy, and assumptions of the derivation."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ FLUID = {"mass": "25 kg", "bulge_stiffness": "260 N/mm", "damping": "500 N s/m"}
 
 
 def random_tables(seed: int, **changes: Any) -> dict[str, Any]:
-    """A single on three or four mounts with one to four stiffnesses open, of several kinds of damping."""
+    """Return a single on three or four mounts with one to four open stiffnesses and several kinds of damping."""
     r = np.random.default_rng(seed)
     count = int(r.integers(3, 5))
     axes = r.permutation(3 * count)[: int(r.integers(1, 5))]
@@ -88,7 +88,7 @@ def random_problem(seed: int, **changes: Any) -> Problem:
 
 
 class Boxes:
-    """A problem, boxes of several sizes within it, and what every measure is at designs."""
+    """Problem, boxes of several sizes within it, and the values of every measure at designs."""
 
     def __init__(self, seed: int) -> None:
         self.problem = random_problem(seed)
@@ -103,13 +103,13 @@ class Boxes:
         self.upper = np.clip(self.middles * (1.0 + self.shares), low, high)
 
     def values(self, x: Array) -> Array:
-        """Largest lengths over all steps, ends of both runs included."""
+        """Return the largest lengths over all steps, ends of both runs included."""
         rows = self.peaks.rows([x])
         assert rows is not None
         return np.array([np.linalg.norm(rows[0][measure], axis=-1).max() for measure in OF_RUNS])
 
     def designs(self, box: int, count: int) -> Array:
-        """Half of them corners."""
+        """Return designs of a box, half of them corners."""
         n = len(self.model.lower)
         shares = np.vstack([self.random.random((count - count // 2, n)), self.random.integers(0, 2, (count // 2, n))])
         return self.lower[box] + shares * (self.upper[box] - self.lower[box])
@@ -148,7 +148,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", first_fast(range(4), 0, 2))
 def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) -> None:
-    """About one middle, from the whole down to nothing, where the bound is what the exact model has there."""
+    """Check that boxes shrinking to their middle have rising bounds, up to the exact model's value."""
     boxes = of_seed(seed)
     sizes = np.array([0.2, 0.1, 0.05, 0.02, 0.01, 0.001, 1e-6])
     middle = np.repeat(boxes.middles[1:2], len(sizes), axis=0)
@@ -164,7 +164,7 @@ def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) ->
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_place_and_time_with_the_highest_bound_is_taken(seed: int) -> None:
-    """Against all places and times one by one."""
+    """Compare with all places and times one by one."""
     rng, (boxes, sides, places, times) = np.random.default_rng(seed), (3, 2, 4, 5)
     pairs = ((0, 0), (0, 1), (1, 1))
     size = rng.uniform(1.0, 4.0, (boxes, places, times))
@@ -185,7 +185,7 @@ def test_the_place_and_time_with_the_highest_bound_is_taken(seed: int) -> None:
 
 @pytest.mark.slow
 def test_scipy_reaches_what_boxes_are_not_under() -> None:
-    """Integrated by its eighth order, with loads at every moment and no modes."""
+    """Compare bounds with SciPy's eighth order, with loads at every moment and no modes."""
     boxes = of_seed(3)
     problem, run = boxes.problem, boxes.problem.engine.extra(Run)
     assert run is not None
@@ -203,7 +203,7 @@ def test_scipy_reaches_what_boxes_are_not_under() -> None:
 
 
 def test_long_steps_end_where_short_ones_do() -> None:
-    """Motion at the middle from moments is that of the exact model, from whichever short step they are counted."""
+    """Compare motion from moments with the exact model, from any short step on."""
     boxes = of_seed(1)
     whole = (boxes.model.lower[None], boxes.model.upper[None])
     of = MotionEquations(boxes.model, RunMatrices(boxes.model), 80.0, *whole)
@@ -224,7 +224,7 @@ def test_long_steps_end_where_short_ones_do() -> None:
 
 
 def test_roots_of_stiffness_are_as_near_as_they_say() -> None:
-    """Random matrices: what is left after the first and the second order of A^{-1/2} is within its bounds."""
+    """Check on random matrices that the rest after the second order of A^{-1/2} is within its bounds."""
     r = np.random.default_rng(4)
     for _ in range(30):
         squares = np.sort(r.uniform(200.0, 8000.0, 6))
@@ -245,7 +245,7 @@ def test_roots_of_stiffness_are_as_near_as_they_say() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 5])
 def test_losses_add_energy_at_no_more_than_the_growth_rate(seed: int) -> None:
-    """The damping of every design in a box takes energy, or gives no more than the rate that is known."""
+    """Check that damping of every design in a box adds energy at no more than the known rate."""
     boxes = of_seed(seed)
     of = MotionEquations(boxes.model, RunMatrices(boxes.model), 80.0, boxes.lower, boxes.upper)
     for box in range(len(SIZES)):
@@ -259,7 +259,7 @@ def test_losses_add_energy_at_no_more_than_the_growth_rate(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", first_fast((2, 5, 0), 2))
 def test_motion_matrices_are_within_the_rest_of_their_expansion(seed: int) -> None:
-    """z' = A z of every design in a box: A to the second order, and no entry of the rest over what is told."""
+    """Check A of z' = A z for every design in a box to second order, with each entry of the rest bounded."""
     boxes, scale = of_seed(seed), 80.0
     of = MotionEquations(boxes.model, RunMatrices(boxes.model), scale, boxes.lower, boxes.upper)
     n, pairs = of.turn.shape[1], pairs_of(of.halves.shape[1])
@@ -281,7 +281,7 @@ def test_motion_matrices_are_within_the_rest_of_their_expansion(seed: int) -> No
 
 
 def test_the_rest_of_expanded_forces_is_within_its_bound() -> None:
-    """Second orders of motion by first ones of forces, bends by both, and a rest that any motion meets."""
+    """Check second orders of motion times first ones of forces, bends times both, and the rest."""
     r = np.random.default_rng(8)
     boxes, sides, n, times = 2, 3, 4, 5
     pairs = pairs_of(sides)
@@ -324,7 +324,7 @@ def orders_within(first: Array, second: Array, a: Array, start: Array, load: Arr
 
 @pytest.mark.parametrize("seed", range(8))
 def test_forces_within_a_step_exceed_its_ends_by_no_more_than_the_bound(seed: int) -> None:
-    """Forces of one spring or several, under a load that jumps, are compared with the exact motion."""
+    """Compare forces of springs under a load that jumps with the exact motion."""
     r, n = np.random.default_rng(seed), 1 + seed % 3
     frequency, rates, zeros = r.uniform(2.0, 8.0), r.choice([0.0, 1.0], 3), np.zeros((n, n))
     spring, change = frequency * np.eye(n), r.uniform(0.1, 1.0) * np.eye(n)
@@ -354,7 +354,7 @@ def test_forces_within_a_step_exceed_its_ends_by_no_more_than_the_bound(seed: in
 
 
 def test_a_motion_of_unit_energy_has_no_larger_signal_than_its_gain() -> None:
-    """Random maps from motion to signals with their change by open numbers, for the softest design of a box."""
+    """Check random maps from motion to signals, with their slopes, for the softest design."""
     r = np.random.default_rng(2)
     boxes, sides, places, d, n, times = 2, 2, 2, 3, 4, 3
     roots_of_stiffness = r.normal(size=(boxes, n, n)) + 3.0 * np.eye(n)
@@ -407,7 +407,7 @@ def stopped(maximum: str, stiffness: str = "300 N/mm", further: tuple[str, ...] 
 
 @pytest.mark.slow
 def test_stops_that_limits_keep_away_from_are_not_met() -> None:
-    """Else what bounds a design without run-ups is all there is; firm stops may be met between two steps."""
+    """Check that run-ups with stops are bounded only under a limit clearly below soft stops."""
     assert bounds_runs(random_problem(1))
     assert not bounds_runs(random_problem(1, objective={"minimise": "static sag"}))
     assert bounds_runs(stopped("1.05 mm"))
@@ -422,7 +422,7 @@ def test_the_tightest_limit_keeps_away_from_stops() -> None:
 
 @pytest.mark.slow
 def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
-    """Draw 50 designs with stops: those under the bound break the limit, and the search comes near to the bound."""
+    """Check 50 designs with stops: those below the bound break the limit, and the search is near the bound."""
     problem = stopped("1.05 mm", objective={"minimise": "run-up force"}, search={"starts": 1})
     result = laufruhe.solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
@@ -453,9 +453,9 @@ def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
 def test_no_design_of_a_grid_is_under_the_bound(
     seed: int, objective: str, limit: tuple[str, str, float] | None
 ) -> None:
-    """Minimised and limited: what is proven holds for 100 designs, and is near to the best of them.
+    """Check bounds of objective and limit for 100 designs, near the best of them.
 
-    A bound is no more than the value it is asked for: asked whether all are half again worse, it stops at the best.
+    A bound does not exceed the value that it has to reach: with a half worse as target, it stops at the best.
     """
     settings: dict[str, Any] = {"objective": {"minimise": objective}, "search": {"starts": 1}}
     bare = random_problem(seed, **settings)
@@ -482,7 +482,7 @@ def test_no_design_of_a_grid_is_under_the_bound(
 
 @pytest.mark.slow
 def test_a_limit_that_no_stiffness_keeps_is_named() -> None:
-    """A little under the least travel there is no design, and the limit is named; a little over it there is one."""
+    """Check limits a little below the least travel (infeasible, named) and a little above it."""
     run = {
         "operating_points": [{"speed": "800 rpm"}],
         "run_up": {"up_to": "800 rpm", "time": "0.2 s", "shut_down_time": "0.2 s"},

@@ -1,4 +1,4 @@
-"""Limits that no stiffness keeps together (E67): against random designs and searches."""
+"""Run-up limits that no stiffness keeps together (E67), compared with random designs and searches."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from laufruhe.solvers.mounts.nonlinear import are_contradictory, minimal_conflic
 
 
 def limits_of(problem: Problem, share: float, seed: int = 0) -> list[dict[str, Any]]:
-    """Force and travel of a run as the best of 30 random designs has them together, times a share."""
+    """Return force and travel of the best of 30 random designs, times a share."""
     r = np.random.default_rng(seed)
     evaluation = evaluate(problem)
     low, high = sides(problem)
@@ -48,7 +48,7 @@ def limited(seed: int, share: float) -> Problem:
 
 @pytest.mark.parametrize("seed", first_fast([10, 6, 9], 0, 1))
 def test_no_search_meets_excluded_limits(seed: int) -> None:
-    """Limits that random designs keep are not excluded; tighter ones are, and a search breaks them."""
+    """Check that limits that random designs keep are not excluded, and that a search breaks excluded ones."""
     attainable = limited(seed, 1.02)
     assert not are_contradictory(attainable, attainable.limits)
     problem = limited(seed, 0.7)
@@ -66,7 +66,7 @@ def test_no_search_meets_excluded_limits(seed: int) -> None:
 
 @pytest.mark.slow
 def test_a_conflict_of_run_ups_is_named() -> None:
-    """Three limits that no stiffness keeps, of which two are kept by some."""
+    """Check three limits that no stiffness keeps, of which some stiffness keeps each two."""
     tables = tables_of(READY)
     force = {"limit": "run-up force", "max": "300 N"}
     problem = load_tables({**tables, "constraints": [*tables["constraints"], force]}, Path("single.toml"))

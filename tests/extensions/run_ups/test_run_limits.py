@@ -1,4 +1,4 @@
-"""Limits of run-up and shut-down that are designed for: linear in the loads, proven, against integration and search."""
+"""Limits of run-up and shut-down, linear in the loads, compared with integration and search."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def limited() -> tuple[Problem, Result]:
 
 @pytest.mark.slow
 def test_a_linear_run_is_that_of_integration(limited: tuple[Problem, Result]) -> None:
-    """Peaks of run-up and shut-down by SciPy's eighth order at a tolerance of 1e-9."""
+    """Compare peaks of run-up and shut-down with SciPy's eighth order at a tolerance of 1e-9."""
     problem, result = limited
     engine, run, point = result.final.engine, problem.engine.extra(Run), problem.points[0]
     inertia, gas = split_loads(engine, point)
@@ -68,7 +68,7 @@ def test_a_linear_run_is_that_of_integration(limited: tuple[Problem, Result]) ->
 
 @pytest.mark.slow
 def test_run_up_limits_hold_the_proven_optimum(limited: tuple[Problem, Result]) -> None:
-    """Limits are kept and met; random designs that keep them are worse; a price is the slope of two more solves."""
+    """Check active limits, worse random designs, and the price as slope of two more solves."""
     problem, result = limited
     assert result.status is Status.OPTIMAL
     assert result.certificate.kind is Proof.GLOBAL
@@ -103,7 +103,7 @@ def test_a_run_up_limit_that_no_design_keeps_is_named() -> None:
 
 @pytest.mark.slow
 def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
-    """Motion of a design is the sum of what rows tell of its weights; with stops no rows tell it."""
+    """Check that motion is the sum of rows of the weights, and that stops leave no rows."""
     limit = "run-up travel", "1 mm"
     problem = problem_of(limit)
     (measure,) = simulated_measures(problem)
@@ -120,7 +120,7 @@ def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
 
 
 def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
-    """Steps of a run are gathered at 48 angles, at which no design keeps this force; over the cycle 7.073 N is kept."""
+    """Check a force of 7.073 N that no design keeps at 48 angles and one keeps over the cycle."""
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183}]}
     tables = {
@@ -147,7 +147,7 @@ def test_limits_of_run_ups_are_not_excluded_beside_what_few_angles_read() -> Non
 
 @pytest.mark.slow
 def test_a_worst_mean_is_decided_under_a_limit_of_a_run_up() -> None:
-    """Starts of the search give its largest mean, which depends on the softness of the program."""
+    """Check that the worst mean over one operating point is proven and equal to the mean."""
     travel = {"limit": "run-up travel", "max": "1.9 mm"}
     results = [
         laufruhe.solve(on_open_mounts(
@@ -163,7 +163,7 @@ def test_a_worst_mean_is_decided_under_a_limit_of_a_run_up() -> None:
 
 @pytest.mark.slow
 def test_limits_of_a_run_up_are_decided_by_from_a_good_start_too() -> None:
-    """A design as given that keeps them is not taken for the best because a better one breaks a step or two."""
+    """Check that a search from a feasible design finds the same optimum."""
     problem = laufruhe.load(READY).at(Fidelity(samples=720, mounts="rigid"))
     whole = laufruhe.solve(problem)
     start = laufruhe.solve(problem.at(Fidelity(samples=720)))

@@ -1,4 +1,4 @@
-"""Moments of long steps of a run (E65) against integrals by quadrature."""
+"""Moments of long steps of a run (E65), compared with integrals by quadrature."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laufruhe.numerics.arrays import Array
 
 @pytest.mark.parametrize("place", [0, 1, 3])
 def test_moments_are_integrals_of_the_polynomials_and_sizes_are_over_them(place: int) -> None:
-    """Loads of which every second step is a hundred times the others; before the run there are none."""
+    """Check loads with every second step a hundred times larger, and none before the run."""
     rng = np.random.default_rng(9)
     times, sweep = 4, Sweep(0.0, 0.0, 0.3, 14)
     wrenches = rng.normal(size=(NODES, 6, sweep.count)) * np.where(np.arange(sweep.count) % 2, 100.0, 1.0)

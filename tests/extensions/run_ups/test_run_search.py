@@ -1,4 +1,4 @@
-"""Run-ups that open mounts and bump stops are designed for: against integration by SciPy, and brute force."""
+"""Open mounts and bump stops designed for run-ups, compared with SciPy and brute force."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def limited(*limits: tuple[str, str], **more: Any) -> Problem:
 
 
 def mounts(stop: dict[str, str] | None = None, **opened: Any) -> dict[str, Any]:
-    """The mounts of the ready problem, all stiffness given, with something else."""
+    """Return the mounts of the ready problem with given stiffness and further keys."""
     tables = tables_of(READY)["mounts"]
     places = []
     for place in tables["places"]:
@@ -66,7 +66,7 @@ def ready() -> tuple[Problem, Result]:
 
 
 def by_scipy(engine: Engine, problem: Problem) -> tuple[float, float]:
-    """Largest force and travel of both runs: E25 written here once more, matrices of the mounts alone shared."""
+    """Return the largest force and travel of both runs by an independent E25 on the same mount matrices."""
     run, model = problem.engine.extra(Run), time_model(mounting_in(engine))
     inertia, gas = run_loads(engine, problem.points[0], problem.fidelity)
     assert gas is None
@@ -171,7 +171,7 @@ def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
 
 @pytest.mark.parametrize("stop", [None, STOP])
 def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
-    """A start that ends on the way to a resonance has its largest motion there, for the search as for the last word."""
+    """Check that a run that ends near a resonance has its largest motion there, in search and exact model."""
     given = mounts(stop)
     given["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
     at_ends = 0
@@ -191,7 +191,7 @@ def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
 
 @pytest.mark.slow
 def test_a_design_of_which_one_run_is_not_followed_has_no_peaks() -> None:
-    """Stops of 30 kN/mm are quicker than the steps of the longer run alone: no peak of either is told."""
+    """Check that stops of 30 kN/mm, too stiff for the steps of one run, leave no peaks of either."""
     given = mounts({**STOP, "stiffness": "30000 N/mm"})
     given["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
     run = {"up_to": "300 rpm", "time": "0.05 s", "shut_down_time": "1.5 s"}
@@ -256,7 +256,7 @@ def test_weights_beside_stops_that_none_meets_are_those_of_the_cones() -> None:
 
 @pytest.mark.slow
 def test_the_least_travel_of_a_start_over_weights_is_proven() -> None:
-    """A convex problem: no random design near or far is better than its bound."""
+    """Check that no random design, near or far, is better than the bound of the convex problem."""
     problem = load_tables(
         {**tables_of(PROBLEMS / "soft-single-run-up.toml"), "run_up": SHORT,
          "constraints": [], "objective": {"minimise": "run-up travel"}},
@@ -280,7 +280,7 @@ def test_the_least_travel_of_a_start_over_weights_is_proven() -> None:
 
 @pytest.mark.slow
 def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
-    """More freedom is never worse: the least force through a start, of mounts alone and with a weight."""
+    """Check that mounts with a weight have no larger least force than mounts alone."""
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
     minimum = {"minimise": "run-up force"}
     # a mount of its own under the weight of the block
@@ -331,7 +331,7 @@ def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
 
 
 def test_fidelities_of_a_run_up_have_its_loads() -> None:
-    """Without operating points there is no run."""
+    """Check that every fidelity keeps the operating points if a run-up is minimised, and not for static sag."""
     settings = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
     assert all(own.points for _, own in ladder(Reference(limited(**settings))))
     assert any(not own.points for _, own in ladder(Reference(limited(objective={"minimise": "static sag"}))))
@@ -353,7 +353,7 @@ def test_error_estimates_of_run_ups_hold_at_finer_steps() -> None:
 
 
 def three(**more: Any) -> dict[str, Any]:
-    """Three cylinders in line."""
+    """Return three cylinders in line."""
     engine = {**tables_of(READY)["engine"], "cylinders": 3, "cylinder_spacing": "120 mm"}
     weights = [
         {"name": name, "x": x, "radius": "70 mm", "mass": {"between": ["0 kg", "1 kg"]}, "angle": {"between": [0, 360]}}
@@ -364,7 +364,7 @@ def three(**more: Any) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_the_star_that_starts_with_least_travel_is_proven() -> None:
-    """Both stars with their weights, each solved by itself: the better one is found, and bounds both."""
+    """Compare with both stars solved by themselves, and their bound."""
     settings = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
     opened = laufruhe.solve(limited(**settings, **three(throws="open", firing_order="open")))
     assert opened.certificate.kind is Proof.GLOBAL
@@ -383,6 +383,6 @@ def test_the_star_that_starts_with_least_travel_is_proven() -> None:
 
 
 def test_run_ups_over_crank_stars_are_refused() -> None:
-    """A crank star on open mounts: the search of stars knows nothing of run-ups there, and says so."""
+    """Check that a crank star on open mounts under a run-up is refused with a reason."""
     with pytest.raises(LaufruheError, match="run-up travel is minimised over unbalances and mounts, not over star"):
         laufruhe.solve(limited(objective={"minimise": "run-up travel"}, **three(throws="open", firing_order="open")))

@@ -1,4 +1,4 @@
-"""Steps of a run-up against integrals, steady states and the periods that they resolve."""
+"""Steps of a run-up, compared with integrals, steady states and the periods that they resolve."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mounts.test_hydraulic_mounts import hydraulic
 
 
 def test_wrenches_of_steps_have_the_integral_of_the_load() -> None:
-    """An order of inertia, which grows with the square of speed, through every step by itself."""
+    """Compare each step with the integral of an inertia order that grows with the square of speed."""
     sweep = Sweep(20.0, 15.0, 0.01, 12)
     load = np.array([[1.0 + 2.0j, 0.0, -0.5j, 0.0, 0.0, 0.3]])
     result = sweep.wrenches([(np.array([2.0]), load)]).reshape(NODES, 6, -1)
@@ -71,7 +71,7 @@ def test_a_run_at_one_speed_ends_in_its_steady_state() -> None:
 
 
 def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> None:
-    """z' = rate z + f0 + (f1 - f0) t / h over a step, of modes as they are, whatever their rates."""
+    """Check z' = rate z + f0 + (f1 - f0) t / h over a step for any rates."""
     mounting = random_mounting(7, loss=0.0, damping=500.0)
     first, *rest = mounting.mounts
     stopped = Mount("stopped", first.position, first.stiffness, first.orientation, damping=first.damping,

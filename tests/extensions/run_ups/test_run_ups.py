@@ -1,4 +1,4 @@
-"""Run-ups in files and reports: what is decided with them, what is refused, and tables that hold what was found."""
+"""Run-ups in files and reports: decisions, refused input, and tables of the results."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def soft() -> str:
 
 @pytest.mark.slow
 def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
-    """The best design without a run-up stays proven if it keeps the limit of the run-up."""
+    """Check that the best design stays proven if it keeps the limit of the run-up."""
     soft += "[search]\nstarts = 1\n"
     alone = laufruhe.solve(loaded(tmp_path, soft))
     result = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))

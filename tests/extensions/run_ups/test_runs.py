@@ -1,4 +1,4 @@
-"""Run-ups on small blocks: loads at their moments, steps by hand, closed forms, and integration by SciPy."""
+"""Run-ups of small blocks, compared with steps by hand, closed forms, and integration by SciPy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from physics.test_static_motion import HEAVE, four_mounts
 
 
 def test_loads_of_a_run_are_taken_at_the_gauss_points() -> None:
-    """Re c e^{i h angle} of every order, the first load times the square of the speed (E28)."""
+    """Check Re c e^{i h angle} of every order, the first load times the square of the speed (E28)."""
     rng = np.random.default_rng(6)
     sweep = Sweep(20.0, 15.0, 0.003, 7)
     loads = [(np.array(orders), rng.normal(size=(2, 6)) + 1j * rng.normal(size=(2, 6))) for orders in ([1, 2], [0, 3])]
@@ -51,7 +51,7 @@ def test_loads_of_a_run_are_taken_at_the_gauss_points() -> None:
 
 @pytest.mark.parametrize("seconds", [4.0, 90.0])
 def test_steps_follow_the_highest_order_and_miss_what_a_wave_leaves(seconds: float) -> None:
-    """So many steps a period of it, fewer in long runs; a cosine between two equal samples is so much higher."""
+    """Check the steps per period, fewer in long runs, and the peak of a cosine between two samples."""
     run = Run(speed=150.0, up=0.5 * seconds, down=seconds)
     sweep = sweep_of(run.speed, 0.0, run.down)
     assert sweep is not None
@@ -81,7 +81,7 @@ def test_a_constant_load_swings_to_twice_its_rest() -> None:
 
 
 def stopped(travels: Array, gaps: Array, stops: Array, stiffness: Array) -> TimeModel:
-    """Return a model of two coordinates; what the block itself would tell is left at zero."""
+    """Return a model of two coordinates with stops and no block."""
     none = np.zeros((3, 2))
     return TimeModel(
         stiffness, np.diag([4.0, 6.0]), np.eye(2, 6), travels, none, none, gaps, stops, np.eye(3)[None],
@@ -90,7 +90,7 @@ def stopped(travels: Array, gaps: Array, stops: Array, stiffness: Array) -> Time
 
 
 def test_stops_push_back_as_scipy_says() -> None:
-    """Two coordinates that a stop joins, driven past both its ends; stiff stops, and a missing design, tell none."""
+    """Compare two coordinates with a shared stop with SciPy; stiff stops and a missing design give none."""
     travels = np.array([[1.0, 0.5], [0.0, 1.0], [1.0, 0.0]])
     gaps, stops = np.array([0.01, np.inf, 0.004]), np.array([3000.0, 0.0, 0.0])
     model = stopped(travels, gaps, stops, np.array([[900.0, 100.0], [100.0, 1600.0]]))
@@ -169,7 +169,7 @@ def test_shut_down_meets_the_same_resonance():
 
 
 def test_a_mode_far_too_fast_to_resolve_is_followed_in_a_run_up():
-    """A block with hardly any inertia in roll runs up like any other as long as nothing rolls it."""
+    """Check that a block with little inertia in roll runs up like any other if no load rolls it."""
     corners = [(x, y, 0.0) for x in (0.3, -0.3) for y in (0.2, -0.2)]
     mounts = [Mount(f"m{k}", place, (1.2e5, 1.2e5, 4e5), loss_factor=0.1) for k, place in enumerate(corners)]
     lift = np.zeros((3, 6), dtype=complex)

@@ -1,4 +1,4 @@
-"""Modes between stops that nothing touches, many steps at once, beside one step after another."""
+"""Modes between stops that no motion touches, in blocks of steps, compared with single steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from laufruhe.extensions.run_ups.stopped_run import _DesignBatch, _followed
 
 
 def test_free_steps_are_those_of_the_matrix_exponential() -> None:
-    """z_{k+1} = e^{A h} z_k + b_k through several blocks, of two designs side by side."""
+    """Check z_{k+1} = e^{A h} z_k + b_k through several blocks, for two designs at once."""
     rng = np.random.default_rng(3)
     designs, modes, steps = 2, 3, 3 * BLOCK + 7
     decays = rng.uniform(0.9, 0.999, (designs, modes)) * np.exp(1j * rng.uniform(0.0, 0.5, (designs, modes)))

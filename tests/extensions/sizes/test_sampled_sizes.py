@@ -1,4 +1,4 @@
-"""Few angles judge no design of sizes that many angles judge otherwise."""
+"""Sizes decided at few angles, compared with many angles."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from solvers.test_sampling_refinement import ENGINE, SECOND, problem
 
 
 def sized(throw: float) -> dict[str, Any]:
-    """A single whose rod may be thinner."""
+    """Return a single whose rod may be thinner."""
     big_end = {"diameter": "50 mm", "width": "28 mm"}
     return {
         "engine": {**ENGINE, "throws": [throw], "bore": "80 mm", "cylinder_spacing": "120 mm", "big_end": big_end},
@@ -45,7 +45,7 @@ def test_a_bound_of_sizes_is_not_over_a_rival_that_many_angles_judge() -> None:
 
 @pytest.mark.parametrize(("throw", "share", "met"), [(0, 0.998, False), (3, 1.0005, True)])
 def test_limits_of_sizes_are_what_the_cycle_has(throw: float, share: float, met: bool) -> None:
-    """48 angles have half a percent too little of it at a throw of none, a quarter too much at 3 deg."""
+    """Check limits on order 2, which 48 angles misread by -0.5 % (throw 0) or +0.25 % (3 deg)."""
     tables = sized(throw)
     minimum = of_many_angles(throw).objective.value
     limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{share * minimum} N"}
@@ -64,7 +64,7 @@ def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
 
 
 def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> None:
-    """48 angles have half a percent too little of the second order; no time is left to look at more."""
+    """Check that no time leaves no design, because 48 angles underestimate order 2 by 0.5 %."""
     tables = sized(0)
     maximum = 0.998 * of_many_angles(0).objective.value
     limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{maximum} N"}

@@ -1,4 +1,4 @@
-"""The least of affine functions of masses and unbalances on a box of sizes, against its corners."""
+"""Least of affine functions of masses and unbalances on a box of sizes, compared with its corners."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def piece_of(random: np.random.Generator, rows: int, columns: int, norm: str) ->
 
 
 def test_a_series_between_two_lengths_is_that_of_its_nodes() -> None:
-    """Rows that are a polynomial of the reciprocal length are told exactly at every length."""
+    """Check that rows polynomial in the reciprocal length are exact at every length."""
     random, (low, high), terms = np.random.default_rng(3), (0.15, 0.35), 5
     piece, powers = piece_of(random, 4, 2, "mean"), random.normal(size=(terms, 4, 3))
 

@@ -1,4 +1,4 @@
-"""Sizes of the running gear as decisions: proven designs against a grid of plain formulas and a geometric program."""
+"""Sizes of the running gear, compared with a grid of plain formulas and a geometric program."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def solved() -> Result:
 
 
 def plain(pin: Array, width: Array, web: Array, rod: Array) -> tuple[Array, Array]:
-    """Mean shaking force and shares of the four limits of many designs, shape (designs,) and (4, designs)."""
+    """Return mean shaking force and shares of four limits of designs, shape (designs,) and (4, designs)."""
     steps, radius = 360, 0.5 * STROKE
     phi = np.arange(steps) * math.tau / steps
     psi = np.arcsin(radius * np.sin(phi) / LENGTH)
@@ -150,7 +150,7 @@ def test_a_price_is_what_a_relaxed_limit_gains(index: int, solved: Result) -> No
 
 
 def test_boxes_bound_what_is_in_them() -> None:
-    """Random boxes and designs in them: no objective under its bound, no allowed design in a box that is dropped."""
+    """Check random boxes: no objective below the bound, no allowed design in an excluded box."""
     problem = laufruhe.load(TEXT)
     model = SizeModel(problem)
     boxes, rng = SizeBoxes(model), np.random.default_rng(2)
@@ -232,7 +232,7 @@ samples = 180
 
 
 def test_masses_that_pass_zero_bound_nothing() -> None:
-    """Journals that reach beyond the pins: whether a thicker web is heavier hangs on the other sizes."""
+    """Check journals that overlap the pins, where a thicker web may be lighter."""
     text = TEXT.replace(f'diameter = "{JOURNAL} m"', 'diameter = { between = ["50 mm", "128 mm"], start = "60 mm" }', 1)
     text = text.replace(f'diameter = "{JOURNAL} m"', 'diameter = "140 mm"')
     text = text.replace('"25 mm", "60 mm"', '"20 mm", "80 mm"')
@@ -245,7 +245,7 @@ def test_masses_that_pass_zero_bound_nothing() -> None:
 
 @pytest.mark.slow
 def test_sizes_without_added_mass_agree_with_a_geometric_program() -> None:
-    """A log-log convex program of cvxpy for the same sizes, loads taken once from the exact model."""
+    """Compare with a log-log convex program of cvxpy under loads of the exact model."""
     result = laufruhe.solve(GP)
     assert result.certificate.kind is Proof.GLOBAL
     engine, point = result.final.engine, result.problem.points[0]
@@ -312,7 +312,7 @@ def test_unsupported_sizes_are_refused_in_a_line(text: str, rule: str, tmp_path:
     ],
 )  # fmt: skip
 def test_sizes_that_are_not_given_are_refused_when_the_file_is_read(quantity: str, rule: str, tmp_path: Path) -> None:
-    """Also beside a limit that nothing keeps, which would be told first otherwise."""
+    """Check the refusal before a limit that no design keeps."""
     head = TEXT.split("[engine.big_end]")[0]
     bearings = '[[main_bearings]]\nx = "60 mm"\n[[main_bearings]]\nx = "-60 mm"\n'
     limits = (
@@ -325,7 +325,7 @@ def test_sizes_that_are_not_given_are_refused_when_the_file_is_read(quantity: st
 
 
 def _rod(length: float, diameter: float) -> tuple[float, float, float]:
-    """Mean shaking force, share of the buckling load and stress of the rod of `single-rod-length`, from places."""
+    """Return mean shaking force, share of buckling load and stress of the rod of `single-rod-length`, from places."""
     phi = 2.0 * math.pi * np.arange(720) / 720
     speed, radius = 3800.0 * math.pi / 30.0, 0.04
     shank = 7850.0 * math.pi / 4.0 * diameter**2 * length
@@ -350,7 +350,7 @@ def _rod(length: float, diameter: float) -> tuple[float, float, float]:
 
 @pytest.mark.slow
 def test_length_and_diameter_of_a_rod_are_proven_against_a_scan_of_positions() -> None:
-    """Neither a shorter nor a longer rod, as thick as it has to be, makes less; more room is never worse."""
+    """Check by a scan of lengths, each as thick as it must be; more room is never worse."""
     result = ready.solved("single-rod-length")
     assert result.certificate.kind is Proof.GLOBAL
     assert "lower bound on" in result.certificate.method
@@ -372,7 +372,7 @@ def test_length_and_diameter_of_a_rod_are_proven_against_a_scan_of_positions() -
 
 
 def test_a_cut_off_that_moves_with_the_rod_is_left_out_of_the_bound() -> None:
-    """Rows that it passes count as nothing: the bound comes near, and no design that is allowed lies under it."""
+    """Check that the bound without moving rows is near, and not above any allowed design."""
     text = (PROBLEMS / "single-rod-length.toml").read_text(encoding="utf-8")
     text = changed(text, 'stroke = "80 mm"', 'stroke = "80 mm"\nbore = "80 mm"').replace(
         "samples = 180", "samples = 90"

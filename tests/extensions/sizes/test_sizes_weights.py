@@ -1,4 +1,4 @@
-"""Sizes and unbalances together: proven against random designs, cone programs at given sizes, and less freedom."""
+"""Sizes with unbalances, compared with random designs, cone programs at given sizes, and less freedom."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_weights_beside_sizes_are_never_worse_and_neither_are_sizes_beside_weigh
 
 
 def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
-    """Random boxes, designs and dual rows: none allowed lies under a bound, or in what was cut off."""
+    """Check random boxes, designs and dual rows: no allowed design is below a bound or excluded."""
     model = SizeModel(problem)
     boxes, rng, feasible = SizeBoxes(model, solve_cone_program), np.random.default_rng(1), 0
     domains = domains_of(problem.unbalances)
@@ -196,7 +196,7 @@ samples = 120
 
 
 def test_the_best_star_is_the_best_of_all_stars_each_with_its_sizes() -> None:
-    """Each star by itself, its throws given, and none is better; with a weight less it is no better."""
+    """Compare with each star by itself, and with one weight less."""
     result = laufruhe.solve(laufruhe.load(STARS).changed(tolerance=TOLERANCE))
     assert result.certificate.kind is Proof.GLOBAL
     values = []
@@ -231,7 +231,7 @@ def test_a_stress_itself_may_be_minimised() -> None:
 
 
 def test_a_mean_that_nothing_meets_at_many_angles_is_named() -> None:
-    """Programs of boxes look at few angles of a mean first, which excludes nothing."""
+    """Check a limit on a mean that boxes at few angles do not exclude."""
     limit = '[[constraints]]\nname = "smooth"\nlimit = "mean shaking force"\nmax = "600 N"\n[fidelity]'
     text = changed(
         changed(FIXED_ROD, 'minimise = "mean shaking force"', 'minimise = "running-gear mass"'), "[fidelity]", limit

@@ -1,4 +1,4 @@
-"""Sections of the running gear: the textbook's and the worked diesel's numbers, statics done anew, and properties."""
+"""Sections of the running gear, compared with textbook numbers, a worked diesel, and independent statics."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class TestTextbook:
         assert FORCE * factor == pytest.approx(printed, abs=0.0005e-3)
 
     def test_pin_in_the_middle_is_eq_99_and_web_eq_100(self, engine: Engine) -> None:
-        """L between the bearings; printed before eq. 100 is the whole force, its 1.5 is of the half on each side."""
+        """Check L between the bearings; the factor 1.5 of eq. 100 is for half the force on each side."""
         length, width, b, h, d, force = 0.16, 0.04, 0.09, 0.03, 0.055, 1e4
         part = replace(engine.slider_cranks[0], x=0.0, big_end=(d, length - 2.0 * h - width))
         bearings = tuple(Bearing(str(x), x, 0.06, width) for x in (0.5 * length, -0.5 * length))
@@ -129,7 +129,7 @@ class TestWorkedDiesel:
     """Part H a; the crankshaft's stresses are statements of problems/replication-worked-diesel.toml."""
 
     def test_rod_buckles(self, engine: Engine) -> None:
-        """19, and 55050 kg at a factor of 15, with 10 for pi^2 and 870 cm4 for the section; these make 55422 kg."""
+        """Check 55422 kg against the printed 55050 kg, with 10 for pi^2 and 870 cm4 for the section."""
         rod = replace(engine.slider_cranks[0], rod_length=1.5, crank_radius=0.3)
         gear = RunningGear(2150000 * 98066.5, rod=Shank(0.115))
         (factor,) = strength.buckling_factors(replace(engine, slider_cranks=(rod,), extras=(gear,)), POINT)
@@ -141,7 +141,7 @@ class TestWorkedDiesel:
 
 
 def test_pieces_of_the_shaft_are_in_balance(engine: Engine) -> None:
-    """Statics anew: supports from moments about each end, the moment at the pin from what stands before it."""
+    """Compare with supports from moments about each end, and the pin moment from loads before it."""
     webs = [(r.x, r.unbalance * POINT.speed**2) for r in engine.rotors if r.unbalance]
     moments = strength.pin_moments(engine, POINT, EXACT).values(np.array([0.7]))[0]
     sides = strength.side_forces(engine, POINT, EXACT).values(np.array([0.7]))[0]
@@ -167,7 +167,7 @@ def test_journals_hand_on_the_torque_of_what_stands_before_them(engine: Engine) 
 
 
 def test_stresses_are_measures_of_a_problem() -> None:
-    """Journals by hand: bending and torsion at one angle, put together by the energy of shear."""
+    """Compare journals with bending and torsion at one angle by hand, combined by distortion energy."""
     problem = laufruhe.load(TEXT)
     evaluation = evaluate(problem)
     point = problem.points[0]
@@ -195,7 +195,7 @@ def test_stresses_are_measures_of_a_problem() -> None:
 
 
 def test_eyes_of_the_rod_are_limits_on_its_pull(tmp_path: Path) -> None:
-    """Textbook, eqs. 95 to 97, sections given: F/(2 A), F r/(2 W) of the masses' pull, which two bolts carry alike."""
+    """Check textbook eqs. 95 to 97: F/(2 A), F r/(2 W) of the pull, shared by two bolts."""
     allowed, area, arm, modulus = 40e6, 0.8e-4, 0.012, 0.4e-6
     free = '[[operating_points]]\nname = "exchange"\nspeed = "3000 rpm"\ngas = false\n[gas]'
     limits = "".join(

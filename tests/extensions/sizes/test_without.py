@@ -1,4 +1,4 @@
-"""Without the folder an open length of rods is a number like any other."""
+"""Open length of rods without the folder, a number like any other."""
 
 from __future__ import annotations
 

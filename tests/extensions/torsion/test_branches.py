@@ -1,4 +1,4 @@
-"""Geared branches against openTorsion, and against the equations of all discs with the gears as constraints."""
+"""Geared branches, compared with openTorsion and with equations of all discs and gear constraints."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TREES = first_fast(SEEDS, 10, 60)
 
 
 def tree(seed: int) -> Torsion:
-    """A random crankshaft of two to five discs, with up to four branches on any disc and up to two dampers."""
+    """Return a random crankshaft of two to five discs, with up to four branches and two dampers."""
     random = np.random.default_rng(seed)
     count = int(random.integers(2, 6))
     discs = [Disc(f"{k}", random.uniform(0.01, 0.5), random.uniform(0.0, 0.5)) for k in range(count)]
@@ -86,7 +86,7 @@ class Full:
         self.friction[:count] = [d.damping for d in chain.discs]
 
     def matrices(self) -> tuple[Array, Array, Array, Array]:
-        """Inertia, damping, stiffness, and a basis of the angles that the gears allow."""
+        """Return inertia, damping, stiffness, and a basis of the angles that the gears allow."""
         stiffness, damping = np.zeros((self.size, self.size)), np.diag(self.friction)
         for (a, b), (k, c) in zip(self.ends, self.values, strict=True):
             row = np.zeros(self.size)
@@ -101,7 +101,7 @@ class Full:
 
 
 def assembly(chain: Torsion) -> opentorsion.Assembly:
-    """The same tree in openTorsion, whose gears run against each other: an idler between turns the sense back."""
+    """Return the same tree in openTorsion, with an idler that restores the sense of turning."""
     full = Full(chain)
     discs = [
         opentorsion.Disk(k, I=i, c=c)
@@ -137,7 +137,7 @@ def test_natural_frequencies_of_trees(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", TREES)
 def test_forced_response_of_trees(seed: int) -> None:
-    """Torque in every section for a torque on each disc at crank speed, in three orders."""
+    """Compare the torque in every section with openTorsion, for a torque on each disc in three orders."""
     chain = tree(seed)
     full, speed, orders = Full(chain), 200.0, np.array([0.5, 2.0, 6.0])
     ours = receptances(chain, orders, speed) * section_stiffness(chain, orders, speed)[:, :, None]
@@ -162,7 +162,7 @@ def test_forced_response_of_trees(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", TREES[:5])
 def test_mean_torque_of_trees(seed: int) -> None:
-    """The mean torque of each disc goes through the sections between it and the load, over their ratios."""
+    """Check that the mean torque of a disc goes through the sections between it and the load, over their ratios."""
     chain = tree(seed)
     mean = receptances(chain, np.zeros(1), 100.0)[0].real
     torque = mean * np.array([[s.stiffness] for s in chain.sections])
@@ -177,7 +177,7 @@ def test_mean_torque_of_trees(seed: int) -> None:
 
 
 def test_rule_of_equivalent_discs() -> None:
-    """A branch of ratio n is a straight shaft with J n^2, k n^2 and c n^2 (Den Hartog)."""
+    """Compare a branch of ratio n with a straight shaft of J n^2, k n^2 and c n^2 (Den Hartog)."""
     chain = tree(3)
     straight = replace(
         chain,
@@ -207,7 +207,7 @@ BRANCH = {
 
 
 def test_branch_of_a_file() -> None:
-    """The gear counts with the disc that drives it, the generator with its own, and both with the turning inertia."""
+    """Check that gear and generator count with their discs and with the turning inertia."""
     without = laufruhe.load(PROBLEMS / "inline-five-damper.toml")
     file = tables_of(PROBLEMS / "inline-five-damper.toml")
     file["torsion"]["branches"] = [BRANCH]

@@ -1,4 +1,4 @@
-"""Open numbers of a crankshaft: boxes feel limits of heat, and are halved by the orders that answer most."""
+"""Open numbers of a crankshaft: boxes exclude designs by limits of heat, and are halved by the strongest orders."""
 
 from pathlib import Path
 

@@ -32,7 +32,7 @@ def without_load(problem: Problem) -> Problem:
 
 
 def test_two_discs_twist_as_the_closed_form_says() -> None:
-    """Twist (T/J)/(w_n^2 - W^2) of two free discs, of which the load excites the rear one."""
+    """Compare the twist of two free discs, the rear one loaded, with (T/J)/(w_n^2 - W^2)."""
     single = tables_of(PROBLEMS / "tractor-single.toml")
     torsion = {
         "throw_inertia": "0.05 kg m^2",
@@ -58,7 +58,7 @@ def test_two_discs_twist_as_the_closed_form_says() -> None:
 @pytest.mark.parametrize("output", [None, "generator"])
 @pytest.mark.parametrize("states", [{}, {"misfire": [2]}])
 def test_a_load_on_a_branch_meets_the_dense_equations(output: str | None, states: dict[str, Any]) -> None:
-    """(K + i H - W^2 J + i W C) q = T for all discs at crank speed, written out from the file (V5, V16)."""
+    """Compare the twist with (K + i H - W^2 J + i W C) q = T, written out from the file (V5, V16)."""
     torsion = {**tables_of(PROBLEMS / "inline-five-generator.toml")["torsion"]}
     torsion |= {"output": output} if output else {}
     point = {"name": "p", "speed": "1500 rpm", **states}
@@ -102,7 +102,7 @@ def test_a_load_on_a_branch_meets_the_dense_equations(output: str | None, states
 
 
 def test_firing_orders_are_ranked_with_the_load() -> None:
-    """The rows of every order are those of the engine that is built with it."""
+    """Compare the rows of every firing order with those of the engine built with it."""
     problem = problem_of("inline-five-torsion", fidelity={"samples": 360})
     phasing = problem.phasing
     family = next(f for f in families_of(phasing)[0])

@@ -46,7 +46,7 @@ def orders_of(count: int) -> list[tuple[int, ...]]:
 
 
 def values_of(whole: dict[str, Any], count: int = 5) -> dict[tuple[int, ...], float]:
-    """Objective of every firing order by the exact model, each engine built anew."""
+    """Return the objective of every firing order by the exact model, each engine built anew."""
     problems = {order: fired(whole, order) for order in orders_of(count)}
     return {order: objective_value(problem, evaluate(problem)) for order, problem in problems.items()}
 
@@ -78,7 +78,7 @@ def test_every_firing_order_is_ranked(every: dict[tuple[int, ...], float]) -> No
 
 
 def test_peaks_are_decided_by_cuts() -> None:
-    """No sum over pairs has a peak: programs of some firing orders, dual cuts for the others."""
+    """Check peaks, which are no sum over pairs: programs of some firing orders, dual cuts for the others."""
     # a peak between the angles of fewer steps would leave a gap
     fine = {"samples": 1440}
     whole = tables(objective={"minimise": "maximum shaft torque", "sections": ["throw 5 - flywheel"]}, fidelity=fine)
@@ -90,14 +90,14 @@ def test_peaks_are_decided_by_cuts() -> None:
 
 
 def test_main_orders_leave_no_choice() -> None:
-    """Order 2.5 is the same for all: whatever is decided is proven, and nothing is gained."""
+    """Check that order 2.5, equal for all firing orders, is proven without a gain."""
     result = laufruhe.solve(problem_of(tables(objective={"minimise": "rms shaft stress", "orders": [2.5, 5]})))
     assert np.ptp(list(ranked(result).values())) < 1e-9 * result.objective.value
     assert result.objective.value == pytest.approx(result.objective.initial, rel=1e-9)
 
 
 def test_couples_and_torsion_together(every: dict[tuple[int, ...], float]) -> None:
-    """The least torsion among orders that keep a limit of the couple; a tighter limit never has less."""
+    """Check the least torsion among orders within a limit of the couple; a tighter limit never has less."""
     couple = {"minimise": "rms rocking couple", "orders": [1, 2]}
     couples = values_of(tables(objective=couple))
     sizes = sorted({round(value, 6) for value in couples.values()})
@@ -126,7 +126,7 @@ def test_a_weighted_sum_of_both() -> None:
 
 @pytest.mark.slow
 def test_firing_orders_with_counterweights_open() -> None:
-    """Torsion under a limit of the mount force that weights have to keep: each order solved by itself agrees."""
+    """Compare torsion under a limit of the mount force with each firing order solved by itself."""
     places = [["250 mm", "230 mm", "0 mm"], ["250 mm", "-230 mm", "0 mm"], ["-550 mm", "0 mm", "0 mm"]]
     weights = [
         {"name": name, "opposite_throw": throw, "unbalance": {"between": ["0 kg m", "0.05 kg m"]}}
@@ -150,7 +150,7 @@ def test_firing_orders_with_counterweights_open() -> None:
 
 
 def test_firing_orders_of_one_star_differ() -> None:
-    """Six cylinders: pairs of cylinders share a step, and which of the two fires first is another order."""
+    """Check six cylinders in pairs on a step: the cylinder of a pair that fires first makes another order."""
     six = tables(phasing={"best": 3}, objective={"minimise": "rms shaft twist"})
     six["engine"] = {**six["engine"], "cylinders": 6}
     result = laufruhe.solve(problem_of(six))
@@ -174,7 +174,7 @@ def test_firing_orders_of_one_star_differ() -> None:
 
 
 def test_the_engine_seen_from_behind() -> None:
-    """Discs, shafts and cylinders in the reverse order: the optimum is the same, its order reversed."""
+    """Check that discs, shafts and cylinders in reverse order have the same optimum in reverse order."""
     problem = problem_of(tables())
     chain = chain_of(problem.engine)
     assert chain is not None
@@ -200,7 +200,7 @@ def turned_problem(problem: Problem, chain: Any) -> Problem:
 
 
 def test_a_peak_between_the_angles_breaks_its_limit() -> None:
-    """The search looks at a limit at its angles, the exact model between them: what breaks it there is no design."""
+    """Check that the exact model excludes a design that breaks a limit between the angles of the search."""
     peak = {"minimise": "maximum shaft torque"}
     coarse = {"fidelity": {"samples": 96, "gas_samples": 720}}
     values = values_of(tables(objective=peak, **coarse))
@@ -231,7 +231,7 @@ def test_the_bound_of_all_orders_is_below_each() -> None:
 
 
 def test_bearings_limit_what_twists() -> None:
-    """The least twist among the orders whose bearings carry no more than is allowed."""
+    """Compare the least twist with that of all orders whose bearing forces are allowed."""
     bearings = [{"x": f"{x} mm"} for x in (250, 44, -250)]
     force = {"minimise": "rms main-bearing force", "bearings": ["2"]}
     loads, twists = values_of(tables(main_bearings=bearings, objective=force)), values_of(tables())
@@ -256,7 +256,7 @@ def test_banks_that_share_throws_are_decided_order_by_order() -> None:
 
 
 def test_heat_of_an_absorber_depends_on_the_firing_order() -> None:
-    """Each order by itself is the judge; a limit that none keeps is proven to be one."""
+    """Compare a limit of heat with each firing order by itself; a limit that none keeps is infeasible."""
     damper = {"name": "damper", "on": "pulley", "inertia": "0.01 kg m^2", "damping": "2 N m s/rad"}
     torsion = tables()["torsion"] | {"absorbers": [damper]}
     limit, few = {"limit": "absorber heat", "max": "1 MW"}, {"samples": 60}

@@ -1,4 +1,4 @@
-"""Critical speeds of crankshafts with pendulums, beside the zeros of a determinant written down here."""
+"""Critical speeds of crankshafts with pendulums, compared with zeros of an independent determinant."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def crankshaft(rng: np.random.Generator) -> Torsion:
 
 @pytest.mark.parametrize("seed", first_fast(range(6), 0, 2))
 def test_an_order_meets_modes_where_the_determinant_vanishes(seed: int) -> None:
-    """Below, above and far from the orders that pendulums are tuned to."""
+    """Check orders below, above and far from those that the pendulums are tuned to."""
     chain = crankshaft(np.random.default_rng(seed))
     for order in (0.5, 2.0, 4.0, 5.5):
         found = math.tau * critical_modes(chain, order).frequencies / order
@@ -79,7 +79,7 @@ def test_an_order_meets_modes_where_the_determinant_vanishes(seed: int) -> None:
 
 
 def test_a_pendulum_stands_its_disc_still_in_its_order() -> None:
-    """The rest of the crankshaft swings against it as against a wall."""
+    """Check that the rest of the crankshaft swings against the disc as against a wall."""
     own = Torsion(
         (Disc("a", 0.1), Disc("b", 0.2)), (ShaftSection("s", 4e5),), (Absorber("pendulum", "a", 0.004, order=2.5),)
     )  # fmt: skip
@@ -97,7 +97,7 @@ def test_modes_without_pendulums_are_the_same_in_every_order() -> None:
 
 
 def test_the_critical_speed_of_a_two_disc_crank_with_a_pendulum() -> None:
-    """Inertia of throw 1 in order 4 by hand: 0.14 + 0.0080277 / (1 - 16 / 20.25) kg m2."""
+    """Check order 4 with the inertia of throw 1 by hand: 0.14 + 0.0080277 / (1 - 16 / 20.25) kg m2."""
     throw, wheel = 0.14 + 0.0080277 / (1.0 - 4.0**2 / 4.5**2), 0.9
     by_hand = math.sqrt(8e5 * (1.0 / throw + 1.0 / wheel)) / 4.0
     result = laufruhe.evaluate(INPUTS / "pendulum.toml")

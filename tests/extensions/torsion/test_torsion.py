@@ -55,7 +55,7 @@ def five() -> tuple[Engine, OperatingPoint]:
 
 
 def test_two_discs() -> None:
-    """w^2 = k (J1 + J2) / (J1 J2)."""
+    """Check w^2 = k (J1 + J2) / (J1 J2)."""
     result = natural_modes(chain([0.3, 0.05], [2e5]))
     assert result.frequencies == pytest.approx([math.sqrt(2e5 * 0.35 / (0.3 * 0.05)) / math.tau], rel=1e-13)
     # the node divides the shaft as the inertias do
@@ -63,7 +63,7 @@ def test_two_discs() -> None:
 
 
 def test_three_discs() -> None:
-    """w^4 - w^2 (k1/J1 + (k1 + k2)/J2 + k2/J3) + k1 k2 (J1 + J2 + J3)/(J1 J2 J3) = 0."""
+    """Check w^4 - w^2 (k1/J1 + (k1 + k2)/J2 + k2/J3) + k1 k2 (J1 + J2 + J3)/(J1 J2 J3) = 0."""
     (a, b, c), (k, m) = (0.02, 0.05, 0.4), (3e5, 8e5)
     roots = np.roots([1.0, -(k / a + (k + m) / b + m / c), k * m * (a + b + c) / (a * b * c)])
     assert natural_modes(chain([a, b, c], [k, m])).frequencies == pytest.approx(
@@ -72,7 +72,7 @@ def test_three_discs() -> None:
 
 
 def test_a_motorcycle_engine() -> None:
-    """Four cylinders with the published chain of their crankshaft: 1169 and 2085 Hz."""
+    """Compare four cylinders with the published frequencies of their crankshaft: 1169 and 2085 Hz."""
     inertias = [1.99e-5, 1.6958e-3, 2.1595e-3, 1.8157e-3, 1.2602e-3, 1.54e-5]
     stiffness = [math.degrees(k) for k in (3014, 2562, 2430, 2636, 2562)]
     assert natural_modes(chain(inertias, stiffness)).frequencies[:2] == pytest.approx([1169, 2085], abs=0.5)
@@ -80,7 +80,7 @@ def test_a_motorcycle_engine() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_modes_are_those_of_the_generalised_eigenproblem(seed: int) -> None:
-    """SciPy's solver of K q = w^2 J q, on matrices put together from scratch; the ring in oil is free."""
+    """Compare modes with SciPy's K q = w^2 J q on independent matrices; the ring in oil is free."""
     own = random_chain(seed)
     count = len(own.discs)
     inertia = np.diag([d.inertia for d in own.discs] + [a.inertia for a in own.absorbers])
@@ -99,7 +99,7 @@ def test_modes_are_those_of_the_generalised_eigenproblem(seed: int) -> None:
 
 
 def test_stiffness_of_round_pieces() -> None:
-    """G I_p / l, compliances added up; a hollow shaft is as stiff as the solid one less its bore."""
+    """Compare stiffness with G I_p / l, compliances added; a bore takes its own stiffness off."""
     one = stiffness_of([(0.2, 0.05, 0.0)], 80e9)
     assert one == pytest.approx(80e9 * math.pi / 32 * 0.05**4 / 0.2)
     assert stiffness_of([(0.2, 0.05, 0.0), (0.2, 0.05, 0.0)], 80e9) == pytest.approx(one / 2)
@@ -108,7 +108,7 @@ def test_stiffness_of_round_pieces() -> None:
 
 
 def test_half_the_reciprocating_mass_turns_with_the_throw() -> None:
-    """Exactly half with a long rod (textbook 2.9); with any rod the mean over a turn, by a finer sum than its own."""
+    """Check half the mass for a long rod (textbook 2.9), else the mean over a turn by a finer sum."""
     yoke = SliderCrank("a", 0.0, 0.05, math.inf, 2.0, rotating_mass=1.0)
     assert reduced_inertia(yoke) == pytest.approx((1.0 + 0.5 * 2.0) * 0.05**2, rel=1e-14)
     short = replace(yoke, rod_length=0.15, rod_inertia_deficit=-2e-4)
@@ -121,7 +121,7 @@ def test_half_the_reciprocating_mass_turns_with_the_throw() -> None:
 
 
 def test_discs_and_pistons_hold_the_energy_of_all_that_turns() -> None:
-    """V14: mean energy of the chain as one rigid piece is that of the flywheel with pistons and rods beside it (F3)."""
+    """Compare the mean energy of the rigid chain with flywheel, pistons and rods (V14, F3)."""
     engine = laufruhe.load(PROBLEMS / "inline-five-damper.toml").engine
     angles = 2.0 * math.pi * np.arange(720) / 720
     of_pistons = moving_inertia(engine, EXACT, angles)[0]
@@ -132,7 +132,7 @@ def test_discs_and_pistons_hold_the_energy_of_all_that_turns() -> None:
 
 @pytest.mark.parametrize("name", ["radial-seven", "vee-eight-cross", "boxer-four", "two-stroke-five"])
 def test_any_mechanism_drives_its_throw(name: str) -> None:
-    """Articulated rods, banks and two strokes: cylinder by cylinder, each later by its firing, as all at once."""
+    """Compare the sum over cylinders, each later by its firing, with all at once: rods, banks, two-strokes."""
     problem = laufruhe.load(PROBLEMS / f"{name}.toml")
     discs = [Disc("front", 0.01), Disc("rear", 0.3)]
     parts = [Disc(part.name, 0.02, cylinders=(part.name,)) for part in problem.engine.slider_cranks]
@@ -162,7 +162,7 @@ def test_throws_together_have_the_torque_of_the_crank(five: tuple[Engine, Operat
 
 
 def test_every_disc_obeys_its_torques(five: tuple[Engine, OperatingPoint]) -> None:
-    """J q'' = T + what the shafts beside it bring - what the cylinder's friction takes, in every order."""
+    """Check J q'' of every disc against its torque, adjacent shafts and cylinder friction, in every order."""
     engine, point = five
     own, torques = chain_of(engine), throw_torques(engine, point)
     orders = torques.orders[1:]
@@ -192,7 +192,7 @@ def test_the_load_takes_the_mean(five: tuple[Engine, OperatingPoint]) -> None:
 
 
 def test_stress_is_torque_over_the_section_modulus(five: tuple[Engine, OperatingPoint]) -> None:
-    """tau = M / W_p, W_p = pi d^3 / 16 (textbook 2.9)."""
+    """Check tau = M / W_p, W_p = pi d^3 / 16 (textbook 2.9)."""
     engine, point = five
     torque, stress = shaft_torque(engine, point).coefficients, shaft_stress(engine, point).coefficients
     assert stress[:, 1] == pytest.approx(torque[:, 1] * 16.0 / (math.pi * 0.048**3))
@@ -200,7 +200,7 @@ def test_stress_is_torque_over_the_section_modulus(five: tuple[Engine, Operating
 
 @pytest.mark.parametrize("seed", range(3))
 def test_work_of_the_torques_becomes_heat(seed: int) -> None:
-    """Work of every order on the discs is lost in shafts, at the cylinders and in the absorbers."""
+    """Check that the work of every order on the discs is lost in shafts, cylinders and absorbers."""
     own, speed = random_chain(seed), 200.0
     cylinder = SliderCrank("one", 0.0, 0.045, 0.16, 0.6)
     own = replace(own, discs=(*own.discs[:3], replace(own.discs[3], cylinders=("one",)), *own.discs[4:]))
@@ -220,7 +220,7 @@ def test_work_of_the_torques_becomes_heat(seed: int) -> None:
 
 
 def dense_angles(own: Torsion, rates: np.ndarray, torque: np.ndarray, disc: int) -> np.ndarray:
-    """Angles of discs and rings, each order by itself."""
+    """Return the angles of discs and rings, each order by itself [rad]."""
     count = len(own.discs) + len(own.absorbers)
     found = []
     for rate, drive in zip(rates, torque, strict=True):
@@ -241,7 +241,7 @@ def dense_angles(own: Torsion, rates: np.ndarray, torque: np.ndarray, disc: int)
 
 
 def test_a_pendulum_holds_its_disc_still_in_its_order() -> None:
-    """Tuned to order n it takes up that order at every speed; in others it is an inertia J / (1 - h^2/n^2) more."""
+    """Check that a pendulum cancels its order n, and adds an inertia J / (1 - h^2/n^2) in order h."""
     bare = chain([0.02, 0.05, 0.3], [3e5, 8e5], damping=0.1)
     own = replace(bare, absorbers=(Absorber("pendulum", "0", 0.004, order=2.5),))
     inertia = 0.02 + 0.004 / (1.0 - 2.0**2 / 2.5**2)
@@ -255,7 +255,7 @@ def test_a_pendulum_holds_its_disc_still_in_its_order() -> None:
 
 
 def test_a_tuned_ring_takes_its_frequency_away() -> None:
-    """A ring tuned to a resonance leaves no resonance there, but one on either side."""
+    """Check that a ring tuned to a resonance replaces it by one on either side."""
     bare = chain([0.02, 0.05, 0.3], [3e5, 8e5])
     (first, _) = natural_modes(bare).frequencies
     tuned = replace(bare, absorbers=(Absorber("ring", "0", 0.004, stiffness=0.004 * (math.tau * first) ** 2),))
@@ -271,7 +271,7 @@ def test_a_resonance_that_nothing_damps_is_an_error() -> None:
 
 
 def test_main_orders_do_not_hang_on_the_firing_order() -> None:
-    """Cylinders in step: all firing orders have the sum of the swings there, and differ elsewhere (textbook 2.9)."""
+    """Check that main orders have the sum of the swings in all firing orders, and others differ (textbook 2.9)."""
     sums = []
     for order in ([1, 2, 4, 5, 3], [1, 3, 5, 4, 2], [1, 5, 2, 3, 4], [1, 4, 3, 2, 5]):
         tables = laufruhe.files.reader.tables_of(PROBLEMS / "inline-five-torsion.toml")
@@ -290,7 +290,7 @@ def test_main_orders_do_not_hang_on_the_firing_order() -> None:
 
 
 def test_scaling() -> None:
-    """Twice the inertia and stiffness: the same frequencies, half the twist. A like chain, 1/L of its frequency."""
+    """Check half the twist at twice the inertia and stiffness, and 1/L of the frequency in a similar chain."""
     own = random_chain(7)
     doubled = replace(
         own,

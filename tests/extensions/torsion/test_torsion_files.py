@@ -1,4 +1,4 @@
-"""[torsion] of a problem file: what it makes, and what it refuses."""
+"""Table [torsion] of a problem file: the chain that it makes, and the input that it refuses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dampers, shafts and flywheels decided against torsion: optima, bounds, limits, and what is refused."""
+"""Open dampers, shafts and flywheels with torsion: optima, bounds, limits and refused input."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def damper() -> tuple[Problem, Result]:
 
 @pytest.mark.slow
 def test_a_viscous_damper_is_proven(damper: tuple[Problem, Result]) -> None:
-    """No design of a grid over the bounds is better, and none of it is under the bound."""
+    """Check by a grid over the bounds that no design is better or below the bound."""
     problem, result = damper
     bounds = [(d.lower, d.upper) for d in problem.decisions]
     grid = [value_at(problem, (a, b)) for a in np.linspace(*bounds[0], 5) for b in np.geomspace(*bounds[1], 12)]
@@ -57,7 +57,7 @@ def test_a_viscous_damper_is_proven(damper: tuple[Problem, Result]) -> None:
 
 @pytest.mark.slow
 def test_other_numbers_agree_with_an_evolution() -> None:
-    """A rubber ring and the stiffness of the crank, three numbers: SciPy's differential evolution finds no better."""
+    """Compare a rubber ring and the stiffness of the crank with SciPy's differential evolution."""
     rubber = {
         "name": "ring", "on": "pulley", "loss_factor": 0.15, "inertia": "0.006 kg m^2",
         "stiffness": {"between": ["5e3 N m/rad", "5e4 N m/rad"], "start": "1e4 N m/rad"},
@@ -75,7 +75,7 @@ def test_other_numbers_agree_with_an_evolution() -> None:
 
 @pytest.mark.slow
 def test_a_shaft_under_a_limit_of_its_frequencies() -> None:
-    """The diameter of the crank with no natural frequency in a band: the design keeps it, its bound holds on a grid."""
+    """Check the crank diameter that leaves a band of frequencies, and its bound on a grid."""
     crank = {"pieces": [{"length": "70 mm", "diameter": {"between": ["40 mm", "60 mm"], "start": "48 mm"}}]}
     band = {"limit": "torsional frequencies", "outside": ["300 Hz", "345 Hz"]}
     # of fewer starts none ends in the better half beside the band
@@ -98,7 +98,7 @@ def test_a_shaft_under_a_limit_of_its_frequencies() -> None:
 
 @pytest.mark.slow
 def test_peaks_have_a_local_optimum(damper: tuple[Problem, Result]) -> None:
-    """Boxes bound root mean squares alone: of a peak nothing is proven, and it is said."""
+    """Check that a peak, which boxes do not bound, has a local optimum and says so."""
     result = laufruhe.solve(problem_of(objective={"minimise": "maximum shaft stress"}))
     assert result.certificate.kind is Proof.LOCAL
     assert result.certificate.lower_bound == 0.0
@@ -107,7 +107,7 @@ def test_peaks_have_a_local_optimum(damper: tuple[Problem, Result]) -> None:
 
 @pytest.mark.slow
 def test_heat_is_a_limit(damper: tuple[Problem, Result]) -> None:
-    """A damper that may give off less is no better."""
+    """Check that a damper with a lower limit of heat is no better."""
     free = damper[1]
     few = {"starts": 2, "boxes": 20}
     problem = problem_of(constraints=[{"limit": "absorber heat", "max": "250 W"}], search=few)
@@ -141,7 +141,7 @@ def test_unsupported_open_numbers_of_torsion_are_refused() -> None:
 
 @pytest.mark.slow
 def test_a_disc_is_sized_for_irregularity_and_stress() -> None:
-    """The least inertia of all that turns is that of a bisection (T4), and no smaller disc keeps the degree."""
+    """Compare the least turning inertia with a bisection (T4); no smaller disc keeps the degree."""
     tables = tables_of(READY)["torsion"]
     pulley, wheel = tables["discs"]
     wheel = {**wheel, "inertia": {"between": ["0.05 kg m^2", "0.5 kg m^2"], "start": "0.14 kg m^2"}}
@@ -171,7 +171,7 @@ def test_a_disc_is_sized_for_irregularity_and_stress() -> None:
 
 @pytest.mark.slow
 def test_a_damper_beside_counterweights(damper: tuple[Problem, Result]) -> None:
-    """Neither feels the other: the sum of both optima, and of both bounds; limits stay with what they are of."""
+    """Check that value and bound of damper and counterweights together are the sums of both alone."""
     webs = [
         {"name": f"web {k}", "opposite_throw": k, "radius": "60 mm", "mass": {"between": ["0 kg", "2 kg"]}}
         for k in (1, 5)

@@ -1,4 +1,4 @@
-"""Torsional response against openTorsion, and against the chain integrated in time."""
+"""Torsional response, compared with openTorsion and with integration in time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DAMPER = Absorber("damper", "pulley", 0.006, damping=3.0)
 
 @pytest.fixture(scope="module")
 def damped() -> tuple[Engine, OperatingPoint]:
-    """The ready five-cylinder with a viscous damper, and what springs lose left to the rings and the cylinders."""
+    """Return the ready five-cylinder engine with a viscous damper, without losses of springs."""
     problem = laufruhe.load(PROBLEMS / "inline-five-torsion.toml")
     own = chain_of(problem.engine)
     sections = tuple(replace(section, loss_factor=0.0, damping=2.0) for section in own.sections)
@@ -30,7 +30,7 @@ def damped() -> tuple[Engine, OperatingPoint]:
 
 
 def assembly(engine: Engine) -> opentorsion.Assembly:
-    """The same chain in openTorsion: the damper's ring last."""
+    """Return the same chain in openTorsion, with the damper's ring last."""
     own = chain_of(engine)
     count = len(own.discs)
     discs = [opentorsion.Disk(k, I=d.inertia, c=d.damping) for k, d in enumerate(own.discs)]
@@ -64,7 +64,7 @@ def test_forced_response_of_open_torsion(damped: tuple[Engine, OperatingPoint]) 
 
 @pytest.mark.slow
 def test_chain_integrated_in_time(damped: tuple[Engine, OperatingPoint]) -> None:
-    """Runge and Kutta from rest until the start has died away: the orders, static twist and all."""
+    """Compare orders and static twist with Runge-Kutta integration until the start has decayed."""
     engine, point = damped
     own, torques = chain_of(engine), throw_torques(engine, point)
     count = len(own.discs)
