@@ -86,7 +86,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture
 def small_trade(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trade calls each fidelity once, for a few designs and scenes: for tests that ask for no times or memory."""
+    """Make a trade call each fidelity once, for few designs and scenes."""
     small = {"_MAX_REPEATS": 1, "DESIGNS": 100, "SCENES": 1, "peak_memory": lambda _: 1}
     for name, value in small.items():
         monkeypatch.setattr(f"laufruhe.extensions.fidelity.trade.{name}", value)

@@ -58,6 +58,6 @@ def first_fast(values: Iterable[Any], fast: int, usual: int | None = None, long:
 
 
 def of_clusters(*libraries: str) -> pytest.MarkDecorator:
-    """Skipped where one of these is not installed; imported only where a test runs, which takes every process time."""
+    """Return a mark that skips a test without these libraries, imported only when the test runs."""
     missing = [name for name in libraries if find_spec(name) is None]
     return pytest.mark.skipif(bool(missing), reason=f"without {' and '.join(missing)}: pip install 'laufruhe[cluster]'")

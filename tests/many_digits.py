@@ -14,7 +14,7 @@ DIGITS = 50
 
 @lru_cache(maxsize=32)
 def acceleration_orders(rod_ratio: float, offset_ratio: float, highest: int) -> NDArray[np.complex128]:
-    """Coefficients of s''/r by the trapezoidal rule on K6 in 50 digits, rounded once at the end.
+    """Return the coefficients of s''/r by the trapezoidal rule on K6 in 50 digits, rounded once at the end.
 
     The rule is exact but for orders above the number of steps, which fall geometrically.
     """

@@ -37,13 +37,13 @@ def angles(turns: int = 1) -> NDArray[np.float64]:
 
 
 def differentiated(path: Complex, turns: int = 1, times: int = 2) -> Complex:
-    """Derivative by the crank angle of samples over whole turns."""
+    """Return the derivative by the crank angle of samples over whole turns."""
     orders = np.fft.fftfreq(STEPS, 1.0 / STEPS) / turns
     return np.fft.ifft(np.fft.fft(path) * (1j * orders) ** times)
 
 
 def finer(values: Complex, times: int = 32) -> Complex:
-    """The same signal at so many times as many angles."""
+    """Return the signal at so many times as many angles."""
     half = STEPS // 2
     result = np.fft.fft(values)
     padded = np.concatenate([result[:half], np.zeros((times - 1) * STEPS, complex), result[half:]])
@@ -51,28 +51,28 @@ def finer(values: Complex, times: int = 32) -> Complex:
 
 
 def crank_pin(radius: float, angle: float = 0.0, ratio: float = 1.0, centre: complex = 0.0) -> Complex:
-    """A point that turns about a centre."""
+    """Return a point that turns about a centre."""
     return centre + radius * np.exp(1j * (angle + ratio * angles()))
 
 
 def piston(pin: Complex, length: float, bank: float, centre: complex = 0.0) -> Complex:
-    """The other end of a rod, on the line through a centre at an angle from upright."""
+    """Return the other end of a rod, on the line through a centre at an angle from upright."""
     local = (pin - centre) * np.exp(-1j * bank)
     return centre + (local.real + np.sqrt(length**2 - local.imag**2)) * np.exp(1j * bank)
 
 
 def force(masses: list[Mass], speed: float) -> Complex:
-    """On the block, Fz + i Fy over the period [N]."""
+    """Return the force on the block, Fz + i Fy, over the period [N]."""
     return sum((-each.mass * speed**2 * differentiated(each.path) for each in masses), np.zeros(STEPS, complex))
 
 
 def couple(masses: list[Mass], speed: float) -> Complex:
-    """My - i Mz = -x (Fz + i Fy) of every mass, over the period [N m]."""
+    """Return the couple My - i Mz = -x (Fz + i Fy) of all masses over the period [N m]."""
     return sum((-each.x * force([each], speed) for each in masses), np.zeros(STEPS, complex))
 
 
 def roll(masses: list[Mass], speed: float) -> NDArray[np.float64]:
-    """Roll moment on the block about the crank axis, y Fz - z Fy, without torques of shafts, over the period [N m]."""
+    """Return the roll moment on the block, y Fz - z Fy, without torques of shafts, over the period [N m]."""
     total = np.zeros(STEPS)
     for each in masses:
         own = force([each], speed)
@@ -81,18 +81,18 @@ def roll(masses: list[Mass], speed: float) -> NDArray[np.float64]:
 
 
 def rigid(mass: float, inertia: float, x: float, centre: Complex, direction: Complex) -> list[Mass]:
-    """A body as two half masses on a line through its centre of gravity that turns with it."""
+    """Return a body as two half masses on a line through its centre of gravity that turns with it."""
     arm = np.sqrt(inertia / mass) * direction / np.abs(direction)
     return [Mass(0.5 * mass, x, centre + arm), Mass(0.5 * mass, x, centre - arm)]
 
 
 def energy(masses: list[Mass]) -> NDArray[np.float64]:
-    """Kinetic energy at unit speed of the crank, over the period [J s2]."""
+    """Return the kinetic energy at unit speed of the crank, over the period [J s2]."""
     return sum((0.5 * each.mass * np.abs(differentiated(each.path, times=1)) ** 2 for each in masses), np.zeros(STEPS))
 
 
 def wrench(masses: list[Mass], speed: float) -> NDArray[np.float64]:
-    """On the block of an engine whose crank drives the masses: Fy, Fz, roll moment over the period, shape (3, STEPS).
+    """Return the wrench (Fy, Fz, roll moment) on the block of masses on a crank over the period, shape (3, STEPS).
 
     The block holds the shaft that takes the energy of the masses.
     """

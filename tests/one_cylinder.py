@@ -21,34 +21,34 @@ from laufruhe.physics.torque import swing_of
 
 
 def rod_inertia_loads(engine: Engine, speed: float) -> Spectrum:
-    """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
+    """Return the roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
     return star_loads(engine.cycle, engine.slider_cranks, speed, lambda part: effects_of(part, EXACT)[1])
 
 
 def rotating_loads(engine: Engine, speed: float) -> Spectrum:
-    """Loads of rotating masses at the crank pins and of every rotor (L1)."""
+    """Return the loads of rotating masses at the crank pins and of every rotor (L1)."""
     return rotor_loads((*engine.pins, *engine.rotors), speed, engine.cycle)
 
 
 def swept_rate(part: SliderCrank, angles: Array) -> Array:
-    """Derivative of `swept_volume` by the crank angle, exact, shape of `angles`."""
+    """Return the derivative of `swept_volume` by the crank angle, exact, shape of `angles`."""
     ratio = part.shaft.ratio
     return np.asarray(-ratio * part.velocity(np, part.fires_at + ratio * angles) / part.stroke)
 
 
 def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> Array:
-    """Torque of one cylinder's gas on the output at equal steps over the cycle from its firing [N m] (L5)."""
+    """Return torque of one cylinder's gas on the output at equal steps over the cycle from its firing [N m] (L5)."""
     angles = cycle.angle * np.arange(samples) / samples
     return np.sum([chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags], axis=0)
 
 
 def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
-    """Degree of irregularity with an inertia without pistons and rods [kg m2] (T3)."""
+    """Return the degree of irregularity with an inertia without pistons and rods [kg m2] (T3)."""
     return swing_of(engine, point, fidelity).irregularity(inertia)
 
 
 def indicated_mean_pressure(pressures: Array, part: SliderCrank, cycle: Cycle) -> float:
-    """Cyclic integral of p dV over the displacement (G3).
+    """Return the cyclic integral of p dV over the displacement (G3).
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def indicated_mean_pressure(pressures: Array, part: SliderCrank, cycle: Cycle) -
 
 
 def cylinder_pressure(gas: OneChamber, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
-    """Absolute cylinder pressure [Pa] at equal steps of the crank angle from the firing dead centre, shape (samples,).
+    """Return the cylinder pressure [Pa] at equal steps of crank angle from the firing dead centre, shape (samples,).
 
     Raises
     ------
@@ -79,7 +79,7 @@ def cylinder_pressure(gas: OneChamber, part: SliderCrank, cycle: Cycle, samples:
 def inertia_coefficients(
     part: SliderCrank, speed: float, fidelity: Fidelity = EXACT
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
-    """Force along the axis and across it [N] and roll moment [N m] of one cylinder, by order of its own crank angle.
+    """Return axial and lateral force [N] and roll moment [N m] of one cylinder, by order of its own crank angle.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def inertia_coefficients(
 
 
 def mean_pressure_of(steam: Steam) -> float:
-    """Area of a diagram over its length [Pa], in closed form (G16)."""
+    """Return the area of a diagram over its length [Pa], in closed form (G16)."""
 
     def fallen(begin: float, end: float) -> float:
         return ((begin + steam.clearance) / (end + steam.clearance)) ** steam.exponent if begin != end else 1.0

@@ -19,7 +19,7 @@ COARSE = 60
 
 
 def faults_of(figure: Figure, engine: str = "") -> list[str]:
-    """Everything wrong with a picture, in words."""
+    """Return the faults of a picture, in words."""
     with styled():
         texts = drawn_texts(figure)
         found = [*_outside(figure, texts), *_covered(texts), *_small(texts), *_pale(figure, texts), *_ticks(figure)]
@@ -33,7 +33,7 @@ def faults_of(figure: Figure, engine: str = "") -> list[str]:
 
 
 def drawn_texts(figure: Figure) -> list[Text]:
-    """Texts that can be seen; matplotlib keeps labels of ticks beyond the ends of an axis."""
+    """Return the texts that can be seen; matplotlib keeps labels of ticks beyond the ends of an axis."""
     figure.draw_without_rendering()
     hidden = set()
     for axes in figure.axes:
@@ -52,7 +52,7 @@ def drawn_texts(figure: Figure) -> list[Text]:
 
 
 def overlaps(texts: list[Text]) -> list[tuple[str, str]]:
-    """Pairs of texts that lie on each other."""
+    """Return the pairs of texts that lie on each other."""
     boxes = [(t.get_text(), Text.get_window_extent(t)) for t in texts]
     return [
         (a, b)
@@ -64,7 +64,7 @@ def overlaps(texts: list[Text]) -> list[tuple[str, str]]:
 
 
 def _outside(figure: Figure, texts: list[Text]) -> Iterator[str]:
-    """Artists beyond the page, as a whole and text by text."""
+    """Yield the artists beyond the page, as a whole and text by text."""
     width, height = figure.get_size_inches() * DPI
     for text in texts:
         box = Text.get_window_extent(text)
@@ -88,7 +88,7 @@ def _small(texts: list[Text]) -> Iterator[str]:
 
 
 def _pale(figure: Figure, texts: list[Text]) -> Iterator[str]:
-    """Letters too near to what lies under them, which is seen with all letters taken away."""
+    """Yield the letters too near to what lies under them, which is seen with all letters taken away."""
     for text in texts:
         text.set_visible(False)
     figure.set_dpi(COARSE)
@@ -111,7 +111,7 @@ def _pale(figure: Figure, texts: list[Text]) -> Iterator[str]:
 
 
 def _ticks(figure: Figure) -> Iterator[str]:
-    """Ticks that a reader cannot count in."""
+    """Yield the ticks that a reader cannot count in."""
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             places = axis.get_majorticklocs()

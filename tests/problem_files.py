@@ -36,7 +36,7 @@ positions = [
 
 
 def shaft(name: str, ratio: int, y: str, unbalance: str) -> str:
-    """A balancer shaft 100 mm under the crank with one unbalance."""
+    """Return a balancer shaft 100 mm under the crank with one unbalance."""
     return f"""
 [[balancer_shafts]]
 name = "{name}"
@@ -48,7 +48,7 @@ position = ["{y}", "-100 mm"]
 
 
 def open_unbalance(upper: str = "0.05 kg m", start: str = "", at: str = "") -> str:
-    """Size and angle left open, with values to start from where these are given."""
+    """Return the text of an open size and angle, with starts if given."""
     return (
         'radius = "20 mm"\n'
         f'unbalance = {{ between = ["0 kg m", "{upper}"]{start and f", start = {start}"} }}\n'
@@ -60,18 +60,18 @@ SECOND_ORDER_SHAFTS = shaft("left", 2, "60 mm", open_unbalance()) + shaft("right
 
 
 def written(folder: Path, text: str, name: str = "scene") -> Path:
-    """A problem file with this text."""
+    """Return a problem file with this text."""
     path = folder / f"{name}.toml"
     path.write_text(text, encoding="utf-8")
     return path
 
 
 def loaded(folder: Path, text: str) -> Problem:
-    """The problem of a text."""
+    """Return the problem of a text."""
     return load(written(folder, text))
 
 
 def changed(text: str, old: str, new: str) -> str:
-    """The text with the first of a word replaced, which has to be there."""
+    """Return the text with the first of a word replaced, which has to be there."""
     assert old in text, old
     return text.replace(old, new, 1)

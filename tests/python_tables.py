@@ -92,7 +92,7 @@ def wrapped(text: str, indent: str) -> str:
 
 
 def packed(items: Sequence[str], indent: str, mark: str = ",") -> str:
-    """Items with a mark behind each, as many on a line as fit; one that is too long is divided at its own commas."""
+    """Return the items with a mark behind each, as many on a line as fit, long ones divided at commas."""
     lines: list[str] = []
     for item in items:
         if lines and len(lines[-1]) + len(item) + 1 + len(mark) <= WIDTH:
@@ -148,7 +148,7 @@ def snake(title: str) -> str:
 
 
 def tables_of(entry: Entry) -> Iterator[tuple[bool, Entry]]:
-    """Tables that may stand for a key, and whether it is a list of them."""
+    """Yield the tables that may stand for a key, and whether it is a list of them."""
     for one in alternatives(schema(), entry):
         if "properties" in one and "between" not in one["properties"]:
             yield False, one
@@ -157,12 +157,12 @@ def tables_of(entry: Entry) -> Iterator[tuple[bool, Entry]]:
 
 
 def fixed_of(table: Entry) -> dict[str, str]:
-    """Key that tells a table from others of its key, with its value."""
+    """Return the key that tells a table from others of its key, with its value."""
     return {key: table["properties"][key]["const"] for key in ("model",) if "const" in table["properties"].get(key, {})}
 
 
 def nested() -> list[Entry]:
-    """Tables inside tables, each once."""
+    """Return the tables inside tables, each once."""
     seen: dict[str, Entry] = {}
 
     def visit(table: Entry) -> None:
@@ -321,7 +321,7 @@ def layouts_module() -> str:
 
 
 def texts() -> dict[Path, str]:
-    """Texts of the files that are made of the schema."""
+    """Return the texts of the files that are made of the schema."""
     return {
         GOALS: goals_module(), TABLES: tables_module(), PARTS: parts_module(), LAYOUT_CALLS: layouts_module(),
     }  # fmt: skip

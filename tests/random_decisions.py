@@ -11,7 +11,7 @@ from laufruhe.problem.problem import Problem
 
 
 def random_decisions(problem: Problem, count: int, seed: int = 0) -> NDArray[np.complex128]:
-    """Decisions spread evenly over their bounds, shape (count, decisions)."""
+    """Return the decisions spread evenly over their bounds, shape (count, decisions)."""
     rng = np.random.default_rng(seed)
     columns: Sequence[NDArray[np.complex128]] = [
         rng.uniform(d.lower, d.upper, count) * np.exp(1j * rng.uniform(*d.set.angles, count))

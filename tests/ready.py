@@ -28,7 +28,7 @@ def solved(name: str) -> Result:
 
 @cache
 def initial_tables(name: str) -> tuple[Result, dict[str, Table]]:
-    """The design as given of a ready problem, and its tables of numbers."""
+    """Return the design as given of a ready problem, and its tables of numbers."""
 
     def fill(folder: Path) -> None:
         result = evaluate_only(load(PROBLEMS / f"{name}.toml"))

@@ -59,7 +59,7 @@ class RigidPart:
 
 
 def rigid_part(problem: Problem) -> RigidPart:
-    """Disagreement of double precision with 50 digits on one problem.
+    """Return the disagreement of double precision with 50 digits on one problem.
 
     Compared are the objective's own measures of loads where mounts are rigid; of elastic
     mounts, of measures of single orders and of problems that measure no load, the mean
@@ -90,7 +90,7 @@ def _is_covered(measure: Measure, engine: Engine) -> bool:
 
 
 def wrench_in_digits(engine: Engine, point: OperatingPoint) -> Digits:
-    """Wrench on the block at STEPS equal steps over the cycle, shape (steps, 6) (L1-L5)."""
+    """Return the wrench on the block at STEPS equal steps over the cycle, shape (steps, 6) (L1-L5)."""
     rows = []
     for k in range(STEPS):
         turn = mpmath.mpf(k * engine.cycle.turns) / STEPS
@@ -108,7 +108,7 @@ def _exact(turn: Turn) -> Any:
 
 
 def _cylinder(part: SliderCrank, turn: Any, speed: float) -> Digits:
-    """Piston, rods and the rotating mass of one cylinder (L1-L4, L7)."""
+    """Return the piston, rods and the rotating mass of one cylinder (L1-L4, L7)."""
     ratio = mpmath.mpf(part.shaft.ratio)
     alpha = 2 * mpmath.pi * (ratio * turn + _exact(part.star_turn))
     axis, square = mpmath.expjpi(2 * _exact(as_turn(part.bank))), (ratio * mpmath.mpf(speed)) ** 2
@@ -120,14 +120,14 @@ def _cylinder(part: SliderCrank, turn: Any, speed: float) -> Digits:
 
 
 def _rotor(rotor: Rotor, unbalance: Any, ahead: Any, turn: Any, speed: float) -> Digits:
-    """U (n w)^2 e^{i n phi}, of an unbalance turned `ahead` by a part of a turn (L1)."""
+    """Return U (n w)^2 e^{i n phi} of an unbalance `ahead` by a part of a turn (L1)."""
     ratio = mpmath.mpf(rotor.shaft.ratio)
     pull = mpmath.mpc(unbalance) * (ratio * mpmath.mpf(speed)) ** 2 * mpmath.expjpi(2 * (ratio * turn + ahead))
     return plane_wrench(pull.imag, pull.real, rotor.x, rotor.shaft)
 
 
 def _gas_torque(engine: Engine, gas: GasModel) -> Digits:
-    """Roll moment of the gas at every step, every firing in its place (L5)."""
+    """Return the roll moment of the gas at every step, every firing in its place (L5)."""
     series: list[Any] = [mpmath.mpc(0)] * (2 * GAS_ORDERS + 1)
     for part in engine.slider_cranks:
         torque = gas_coefficients(gas, part, engine.cycle, FINE).coefficients
@@ -141,7 +141,7 @@ def _gas_torque(engine: Engine, gas: GasModel) -> Digits:
 
 
 def mount_maps_in_digits(mounts: Sequence[Mount]) -> list[Digits]:
-    """k_i G_i (sum G' k G)^+ of every mount, shape (3, 6) each (M1, M2)."""
+    """Return k_i G_i (sum G' k G)^+ of every mount, shape (3, 6) each (M1, M2)."""
     digits = np.vectorize(mpmath.mpf, otypes=[object])
     places = [digits(point_motion(NUMBERS, mount.position)) for mount in mounts]
     turns = [digits(np.array(mount.orientation)) for mount in mounts]
@@ -154,7 +154,7 @@ def mount_maps_in_digits(mounts: Sequence[Mount]) -> list[Digits]:
 
 
 def _vectors(measure: Measure, problem: Problem, wrenches: Sequence[Digits]) -> Digits:
-    """The vectors whose norm a measure is, in the order of `load_rows` (P1)."""
+    """Return the vectors whose norm a measure is, in the order of `load_rows` (P1)."""
     mounts, blocks = problem.engine.mounts, []
     maps = mount_maps_in_digits(mounts) if measure.on_mounts else []
     for point, share, wrench in zip(problem.points, measure.shares(problem.points), wrenches, strict=True):

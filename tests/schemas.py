@@ -50,7 +50,7 @@ def _texts() -> dict[str, dict[str, Any]]:
 
 
 def explained(schema: dict[str, Any]) -> dict[str, Any]:
-    """The schema, with words and an example on every key."""
+    """Return the schema, with words and an example on every key."""
     tables = {schema["title"]: schema, **schema["definitions"]}
     keys = [(name, key) for name, table in tables.items() for key in table.get("properties", {})]
     # all of them before any is written: examples of tables are made of those of their keys
@@ -132,7 +132,7 @@ def _of_table(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
 
 
 def _example(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str, depth: int) -> Any:
-    """A value that may stand for a key."""
+    """Return a value that may stand for a key."""
     examples = _texts()["examples"]
     if path in examples:
         return examples[path]
@@ -147,7 +147,7 @@ def _example(schema: Mapping[str, Any], entry: Mapping[str, Any], path: str, dep
 
 
 def _of(schema: Mapping[str, Any], one: Mapping[str, Any], depth: int) -> Any:
-    """An example of one of the kinds that may stand for a key."""
+    """Return an example of one of the kinds that may stand for a key."""
     if one.get("examples"):
         return one["examples"][0]
     if "const" in one or "enum" in one:
@@ -163,17 +163,17 @@ def _of(schema: Mapping[str, Any], one: Mapping[str, Any], depth: int) -> Any:
 
 
 def problem_schema() -> dict[str, Any]:
-    """The schema of problem files as the models have it now."""
+    """Return the schema of problem files as the models have it now."""
     return _schema(file_model())
 
 
 def schema() -> str:
-    """The text of the schema of problem files."""
+    """Return the text of the schema of problem files."""
     return _text(problem_schema())
 
 
 def _schema(model: type[BaseModel], selector: Callable[[Any], Any] = lambda found: found) -> dict[str, Any]:
-    """In the draft that editors support; what is kept of it is explained."""
+    """Return the schema in the draft that editors support, with explanations."""
     found = selector(model.model_json_schema(ref_template="#/definitions/{model}"))
     whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
     whole["definitions"] = whole.pop("$defs")
@@ -217,7 +217,7 @@ def _named(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_catalogue_key(schema: dict[str, Any]) -> None:
-    """[engine] in a schema: a table, in which an engine of the catalogue may stand for the rest, or its name.
+    """Describe [engine] in a schema: a table, in which an engine of the catalogue may stand for the rest, or its name.
 
     One schema for both, so that an editor marks the key that is wrong and not the whole table.
     """
@@ -233,7 +233,7 @@ def _with_catalogue_key(schema: dict[str, Any]) -> None:
 
 
 def study_schema() -> str:
-    """The schema of study files, for editors: what a part leaves out may stand in [study.common]."""
+    """Return the schema of study files, for editors: what a part leaves out may stand in [study.common]."""
     result = _schema(StudyFile, without_open)
     holder = result["definitions"]["StudyTable"]["properties"]["parts"]
     kinds = {kind: ref.rsplit("/", 1)[1] for kind, ref in holder["items"]["discriminator"]["mapping"].items()}

@@ -14,7 +14,7 @@ _FOLDER = "LAUFRUHE_TESTS_SHARED"
 
 
 def prepare(config: pytest.Config) -> None:
-    """A folder for this run; processes that it starts inherit its name."""
+    """Prepare a folder for this run; its processes inherit the name."""
     if _FOLDER not in os.environ:
         folder = tempfile.TemporaryDirectory(prefix="shared-")
         os.environ[_FOLDER] = folder.name
@@ -23,7 +23,7 @@ def prepare(config: pytest.Config) -> None:
 
 
 def once(name: str, make: Callable[[Path], object]) -> Path:
-    """A folder that `make` has filled, once in this run."""
+    """Return a folder that `make` has filled, once in this run."""
     folder = Path(os.environ[_FOLDER]) / name
     done = folder / "done"
     with folder.with_name(f"{name}.lock").open("w") as lock:

@@ -21,7 +21,7 @@ GAS = Seiliger(peak_pressure=78.5e5, imep=5.4e5)
 
 
 def mounts(cylinders: int) -> tuple[Mount, ...]:
-    """The study's long mounting: (z + 7) a apart, 504 mm across."""
+    """Return the study's long mounting: (z + 7) a apart, 504 mm across."""
     front = 0.5 * (cylinders + 1) * SPACING
     rear = front - (cylinders + 7) * SPACING
     return tuple(
@@ -37,7 +37,7 @@ def engine(
     cycle: Cycle = Cycle.FOUR_STROKE,
     firing_order: Sequence[int] | None = None,
 ) -> Engine:
-    """The tractor engine with these throws."""
+    """Return the tractor engine with these throws."""
     mechanism = mechanism_of(RADIUS, RADIUS / LAMBDA, MASS, bore=0.1)
     layout = inline(len(throws_deg), SPACING)
     cylinders, _ = build(cycle, layout, mechanism, [math.radians(t) for t in throws_deg], firing_order)
@@ -45,17 +45,17 @@ def engine(
 
 
 def free_unbalance(rotor: str, upper: float = 0.3) -> Decision:
-    """Size and angle of one rotor open."""
+    """Return the size and angle of one rotor open."""
     return Decision(f"{rotor}.unbalance", "kg m", Sector(upper), 0j, (RotorDrive(rotor, 1.0),))
 
 
 def shaft_rotor(name: str, ratio: float, x: float, y: float = 0.0, z: float = 0.0) -> Rotor:
-    """A balancer without unbalance yet."""
+    """Return a balancer without unbalance yet."""
     return Rotor(name, x, 0j, Shaft(name.split(".")[0], ratio, y, z), Role.BALANCER, 0.02)
 
 
 def web(name: str, x: float) -> Rotor:
-    """A counterweight without unbalance yet."""
+    """Return a counterweight without unbalance yet."""
     return Rotor(name, x, 0j, CRANKSHAFT, Role.COUNTERWEIGHT, 0.08)
 
 

@@ -70,7 +70,7 @@ class Verdict:
 
 
 def solved(table: Table, folder: Path, name: str = "problem") -> Any:
-    """The result of a problem, or the error that ended it."""
+    """Return the result of a problem, or the error that ended it."""
     import laufruhe
 
     path = folder / f"{name}.toml"
@@ -95,7 +95,7 @@ def collected_complaints(wrong: list[str]):
 
 
 def tried(verdict: Verdict, work: Callable[[], list[str]]) -> Verdict:
-    """Complaints of a piece of work that solves; an error is one."""
+    """Return the complaints of a piece of work that solves; an error is one."""
     started = time.perf_counter()
     try:
         with collected_complaints(verdict.wrong):
@@ -111,7 +111,7 @@ def tried(verdict: Verdict, work: Callable[[], list[str]]) -> Verdict:
 
 
 def message_of(error: Exception) -> str:
-    """An error with the line that raised it."""
+    """Return an error with the line that raised it."""
     last = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {str(error)[:200]}"
 
@@ -151,7 +151,7 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
 
 
 def judge_by_own(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, maximum: int) -> None:
-    """Complaints about a result by the own model."""
+    """Add complaints about a result by the own model."""
     verdict.status = result.status.value
     if result.certificate is not None:
         verdict.kind, verdict.gap = result.certificate.kind.value, result.certificate.gap
@@ -159,7 +159,7 @@ def judge_by_own(verdict: Verdict, table: Table, result: Any, rng: np.random.Gen
 
 
 def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, maximum: int) -> None:
-    """Complaints about a result."""
+    """Add complaints about a result."""
     if result.certificate is not None and (isinstance(table["objective"], list) or "robust" in table):
         verdict.status, verdict.kind = result.status.value, result.certificate.kind.value
         verdict.gap = result.certificate.gap
@@ -219,7 +219,7 @@ def _size(table: Table) -> float:
 
 
 def _limits_read(result: Any, scene: Any) -> Iterator[tuple[Table, Any, float]]:
-    """Limits, and what the plain model says of the final design."""
+    """Yield the limits, and what the plain model says of the final design."""
     for entry, limit in zip(scene.table.get("constraints", []), result.limits, strict=False):
         if entry["limit"] != "natural frequencies" and entry.get("name") == limit.name:
             yield entry, limit, scene.measure({**entry, "quantity": entry["limit"]})
@@ -234,7 +234,7 @@ def _read_low(result: Any, scene: Any) -> float:
 
 
 def _judge_value(verdict: Verdict, result: Any, scene: Any, value: float, reading: float, floor: float) -> None:
-    """Objective and limits of the final design."""
+    """Check objective and limits of the final design."""
     away = abs(scene.objective - value)
     if away > (reading + 1.5 * result.error_estimate) * max(value, scene.objective) + floor:
         verdict.wrong.append(
@@ -267,7 +267,7 @@ def _rival(
 
 
 def _judge_infeasible(verdict: Verdict, openings: Openings, rng: np.random.Generator, maximum: int) -> None:
-    """A design that keeps every limit must not exist."""
+    """Check that no design keeps every limit of an infeasible result."""
     if openings.numbers:
         rival = local_rival(openings, rng, [openings.nearest(np.zeros(openings.size))], 100 * maximum)
     else:

@@ -45,7 +45,7 @@ WIDE = {"between": ["-0.2 m", "0.2 m"]}
 
 
 def weights(rng: Generator, table: Table, count: int) -> list[Table]:
-    """Counterweights of any angle that may be nothing."""
+    """Return the counterweights of any angle that may be nothing."""
     rows = counterweights(rng, moving_mass(table["engine"]), count)
     for entry in rows:
         entry["angle"] = {"between": [0, 360]}
@@ -72,7 +72,7 @@ def on_mounts(rng: Generator, table: Table) -> Table:
 
 
 def at_a_share(rng: Generator, table: Table, entry: Table) -> Table:
-    """A limit on a measure, a little over what a random design has, or under what most have."""
+    """Return a limit on a measure, a little over what a random design has, or under what most have."""
     model = OwnModel(table, 256, 1e-9)
     low, high = model.box.T
     has = model.designs(low + (high - low) * rng.random((20, len(low)))).measure(entry)
@@ -102,7 +102,7 @@ def damper_and_weights(rng: Generator) -> Table:
 
 
 def sag_and_weights(rng: Generator) -> Table:
-    """Weights beside stiffness under a limit on static sag."""
+    """Return the weights beside stiffness under a limit on static sag."""
     table = scene(rng, 2, True)
     open_numbers(rng, table, ["stiffness"] * int(rng.integers(1, 3)))
     table["counterweights"] = weights(rng, table, 1)
@@ -112,7 +112,7 @@ def sag_and_weights(rng: Generator) -> Table:
 
 
 def motion_frequency_and_stiffness(rng: Generator) -> Table:
-    """Stiffness under a limit on the frequency of a motion, which no bound knows."""
+    """Return the stiffness under a limit on the frequency of a motion, which no bound knows."""
     table = scene(rng, 2, True)
     open_numbers(rng, table, ["stiffness"] * int(rng.integers(1, 4)))
     table["objective"] = objective(random_load(rng, table))
@@ -175,7 +175,7 @@ def leads_and_places(rng: Generator) -> Table:
 
 
 def pistons_and_stars(rng: Generator) -> Table:
-    """The reciprocating mass is open beside a star, with weights that are given or open."""
+    """Return an engine with open reciprocating masses and an open star, with weights given or open."""
     engine = star_engine(rng)
     mass = number(engine["reciprocating_mass"])
     table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
@@ -221,7 +221,7 @@ STEEP_CHARGE = 1e5
 
 
 def robust_and_star(rng: Generator) -> Table:
-    """The worst case of weights that weigh more or less, beside a star."""
+    """Return the worst case of weights that weigh more or less, beside a star."""
     engine = star_engine(rng)
     table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
     table["counterweights"] = weights(rng, table, int(rng.integers(1, 3)))
@@ -254,7 +254,7 @@ CROSSINGS = {**PLAIN_CROSSINGS, **OWN_CROSSINGS}
 
 
 def choices(table: Table) -> Iterator[Table]:
-    """The table with every choice of its optional shafts, as many as may be built."""
+    """Yield the table with every choice of its optional shafts, as many as may be built."""
     shafts = table.get("balancer_shafts", [])
     optional = [k for k, shaft in enumerate(shafts) if shaft.get("optional")]
     maximum = min(table.get("phasing", {}).get("most_shafts", len(optional)), len(optional))
@@ -266,7 +266,7 @@ def choices(table: Table) -> Iterator[Table]:
 def best_of_choices(
     table: Table, rng: Generator, known: tuple[np.ndarray, Table], calls: int, target: float
 ) -> Rival | None:
-    """The best design of every star and every choice of shafts, each by a search of its own; None if they are many."""
+    """Return the best design of all stars and choices of shafts, each by its own search; None if they are many."""
     every = [(Openings(one), star) for one in choices(table) for star in stars_of(Openings(one))]
     if not every or len(every) > calls // 60:
         return None
@@ -287,7 +287,7 @@ def best_of_choices(
 
 
 def worst(openings: Openings, vector: np.ndarray, star: Table) -> float:
-    """The most that an engine has whose weights are as much too heavy or too light as they may be."""
+    """Return the most that an engine has whose weights are as much too heavy or too light as they may be."""
     scene = openings.scene(openings.nearest(vector.copy()), star)
     counterweights = [k for k, rotor in enumerate(scene.rotors) if rotor[6] == "c"]
     values = []
@@ -323,7 +323,7 @@ def judge_robust(verdict: Any, table: Table, result: Any, maximum: int) -> None:
 
 
 def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
-    """Each rank under the limits and what those before it leave it."""
+    """Check each rank under the limits and the values that earlier ranks leave it."""
     limits = list(table["constraints"])
     openings = Openings({**table, "objective": table["objective"][0]})
     vector, _ = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})

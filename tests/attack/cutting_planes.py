@@ -39,7 +39,7 @@ class Load:
         self.share = weights / weights.sum()
 
     def planes(self, x: np.ndarray) -> list[Plane]:
-        """Values and subgradients of which the largest counts."""
+        """Return the values and subgradients of which the largest counts."""
         rows = self.at_zero + self.slopes @ x
         if self.norm == "peak to peak":
             return [plane for k in np.flatnonzero(self.share) for plane in self._balls(rows[k], self.slopes[k])]
@@ -157,7 +157,7 @@ class Program:
         charge: float = 1e3,
         target: float = math.inf,
     ) -> Optimum:
-        """Least objective; what cannot be kept is broken as little as the charge makes it.
+        """Return the least objective; what cannot be kept is broken as little as the charge makes it.
 
         Parameters
         ----------
@@ -168,7 +168,7 @@ class Program:
         return _Search(self, value or 1.0, charge).run(start, accuracy, maximum, target / (value or 1.0))
 
     def minimum_violation(self, start: np.ndarray, accuracy: float = 1e-6, maximum: int = 250) -> Optimum:
-        """Least largest excess of the limits, as shares of them; its bound above zero proves that no design exists."""
+        """Return the least largest excess of the limits as a share; a bound above zero proves that no design exists."""
         return _Search(self, 1.0, 1.0, only_limits=True).run(start, accuracy, maximum, 1e-6)
 
 
@@ -186,7 +186,7 @@ class _Search:
         self._sets()
 
     def _sets(self) -> None:
-        """Half planes around discs, and the sides of sectors."""
+        """Add the half planes around discs, and the sides of sectors."""
         at = 0
         for w, _ in self.p.openings.parts(np.zeros(self.q)):
             if w.entries == 2:
@@ -299,7 +299,7 @@ class _Search:
         return point.x[: self.q] if point.status == 0 else None
 
     def _prices(self, solved: Any) -> tuple[float, ...]:
-        """Fall of the objective per unit of each limit."""
+        """Return the fall of the objective per unit of each limit."""
         prices, of = -solved.ineqlin.marginals, np.array(self.of_limit)
         return tuple(
             float(prices[: len(of)][of == j].sum()) * self.unit / maximum for j, maximum in enumerate(self.p.maximum)

@@ -26,12 +26,12 @@ UNITS = {"mount force": "N", "shaking force": "N", "rocking couple": "N m", "rol
 
 
 def q(value: float, unit: str, digits: int = 6) -> str:
-    """A number with its unit, to so many digits."""
+    """Return a number with its unit, to so many digits."""
     return f"{float(f'{value:.{digits}g}')!r} {unit}"
 
 
 def toml(table: Table) -> str:
-    """Text of a problem file."""
+    """Return the text of a problem file."""
     lines: list[str] = []
     tables: list[str] = []
     for key, value in table.items():
@@ -70,7 +70,7 @@ def _inline_toml(value: Any) -> str:
 
 
 def mechanism(rng: Generator, plain: bool = False) -> Table:
-    """Sizes that every layout has."""
+    """Return the sizes that every layout has."""
     radius = rng.uniform(0.03, 0.08)
     engine = {
         "cycle": str(rng.choice(["two-stroke", "four-stroke"])),
@@ -150,7 +150,7 @@ def radial(rng: Generator) -> Table:
 
 
 def parts(rng: Generator) -> Table:
-    """Slider-cranks on two geared shafts, no two alike."""
+    """Return the slider-cranks on two geared shafts, no two alike."""
     engine = {"layout": "parts", **mechanism(rng)}
     engine["shafts"] = [
         {"name": "first", "position": ["0.0 m", "0.0 m"]},
@@ -174,7 +174,7 @@ def parts(rng: Generator) -> Table:
 
 
 def moving_mass(engine: Table) -> float:
-    """Reciprocating mass times crank radius of all cylinders, about [kg m]."""
+    """Return the reciprocating mass times crank radius of all cylinders, about [kg m]."""
     if engine["layout"] == "rotary":
         count = engine["cylinders"] if engine["throws"] == "open" else len(engine["throws"])
         return count * number(engine["rotor_mass"]) * number(engine["eccentricity"])
@@ -259,7 +259,7 @@ def balancers(rng: Generator, size: float, count: int) -> list[Table]:
 def random_term(
     rng: Generator, table: Table, channels: tuple[str, ...] = LOADS, norms: tuple[str, ...] = NORMS
 ) -> Table:
-    """A quantity and what narrows it."""
+    """Return a quantity and what narrows it."""
     share = np.array([0.55] + [0.45 / (len(channels) - 1)] * (len(channels) - 1)) if len(channels) > 1 else [1.0]
     channel = str(rng.choice(channels, p=share))
     term: Table = {"quantity": f"{rng.choice(norms)} {channel}"}
@@ -299,7 +299,7 @@ Engine = Callable[[Generator], Table]
 
 
 def of_unbalances(engine: Engine, most_points: int = 2) -> Callable[[Generator], Table]:
-    """An engine on rigid mounts whose counterweights and balancer shafts are open."""
+    """Return an engine on rigid mounts whose counterweights and balancer shafts are open."""
 
     def made(rng: Generator) -> Table:
         built = engine(rng)
@@ -314,7 +314,7 @@ def of_unbalances(engine: Engine, most_points: int = 2) -> Callable[[Generator],
 
 
 def gas_engine(rng: Generator) -> Table:
-    """In line, at angles that fire one after the other, no two at once."""
+    """Return an engine in line whose cylinders fire one after another."""
     engine = {"layout": "inline", **mechanism(rng, plain=True), **spaced(rng)}
     engine["bore"] = q(rng.uniform(0.06, 0.12), "m")
     count, turns = int(rng.integers(1, 5)), 2 if engine["cycle"] == "four-stroke" else 1
@@ -343,7 +343,7 @@ def with_gas(rng: Generator) -> Table:
 
 
 def with_states(rng: Generator) -> Table:
-    """Points at which some cylinders misfire or are cut, beside those at which all fire; the worst mean may count."""
+    """Return points with cylinders that misfire or are cut, and points at which all fire; at times the worst mean."""
     table = with_gas(rng)
     count, objective = len(table["engine"]["throws"]), json.dumps(table["objective"])
     for point in table["operating_points"]:
@@ -362,7 +362,7 @@ def with_states(rng: Generator) -> Table:
 
 
 def yoke(rng: Generator) -> Table:
-    """Rams in line, with levers that weigh something."""
+    """Return the rams in line, with levers that weigh something."""
     engine = {**mechanism(rng, plain=True), **spaced(rng), "throws": throws(rng, int(rng.integers(1, 4)))}
     del engine["rod_length"]
     pivot = rng.uniform(0.08, 0.2)
@@ -378,7 +378,7 @@ def yoke(rng: Generator) -> Table:
 
 
 def chamber(rng: Generator, count: int) -> Table:
-    """Steam or a pump at either end of some cylinders."""
+    """Return an engine with steam or a pump at either end of some cylinders."""
     bore = rng.uniform(0.05, 0.12)
     entry: Table = {"end": str(rng.choice(["head", "crank"])), "bore": q(bore, "m")}
     if rng.random() < 0.5:
@@ -398,7 +398,7 @@ def chamber(rng: Generator, count: int) -> Table:
 
 
 def with_chambers(rng: Generator) -> Table:
-    """Engines in line or lists of parts with chambers in place of cylinders of one side."""
+    """Return the engines in line or lists of parts with chambers in place of cylinders of one side."""
     table = of_unbalances(lambda source: {**inline(source), "cycle": "two-stroke"})(rng)
     count = len(table["engine"]["throws"])
     chambers = [{"name": f"k{k}", **chamber(rng, count)} for k in range(int(rng.integers(1, 4)))]
@@ -406,7 +406,7 @@ def with_chambers(rng: Generator) -> Table:
 
 
 def crankcase(rng: Generator) -> Table:
-    """Weights against main bearings; torque, stored work, twist and irregularity beside them, as limits that hold."""
+    """Return weights with main bearings; torque, stored work, twist and irregularity as limits."""
     engine = {k: v for k, v in gas_engine(rng).items() if k != "rod_inertia_deficit"}
     size, count, distance = moving_mass(engine), len(engine["throws"]), float(engine["cylinder_spacing"].split()[0])
     table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
@@ -442,7 +442,7 @@ INSIDE = ("main-bearing force", "crank torque", "stored work", "shaft twist", "c
 
 
 def uneven_crankcase(rng: Generator) -> Table:
-    """Throws between bounds of their own in an order that they keep: bearings, torque, work or twist are minimised."""
+    """Return throws between bounds in a given order, with bearings, torque, work or twist minimised."""
     table = crankcase(rng)
     wide = 0.0
     while wide < 3.0:
@@ -527,7 +527,7 @@ def block(rng: Generator) -> Table:
 
 
 def elastic_mounts(rng: Generator) -> Table:
-    """Four mounts, one under each corner, alike in nothing."""
+    """Return four different mounts, one under each corner."""
     corners = ((1, 1), (1, -1), (-1, 1), (-1, -1))
     rows = []
     for k, (along, aside) in enumerate(corners):
@@ -543,7 +543,7 @@ def elastic_mounts(rng: Generator) -> Table:
 
 
 def opened_stiffness(rng: Generator, mounts: Table, count: int) -> None:
-    """So many of the twelve stiffnesses open, from a half or a fifth of theirs to two or five times as much."""
+    """Open so many of the twelve stiffnesses, from 1/5 or 1/2 of theirs to 2 or 5 times as much."""
     for k in rng.choice(12, count, replace=False):
         stiffness, axis = mounts["places"][int(k) // 3]["stiffness"], int(k) % 3
         middle, wide = float(stiffness[axis].split()[0]), rng.choice([2.0, 5.0])
@@ -565,7 +565,7 @@ SMOOTH = ("mean", "maximum", "rms")
 
 
 def limits_at(rng: Generator, table: Table, choices: list[Table], share: float = 0.6) -> Table:
-    """Limits a little under or over what a random design has, so that it, or another, keeps them."""
+    """Return the limits a little under or over what a random design has, so that it, or another, keeps them."""
     from attack.openings import Openings
 
     if rng.random() > share:
@@ -626,7 +626,7 @@ def convex_mounts(rng: Generator) -> Table:
 
 
 def joint(rng: Generator) -> Table:
-    """Mounts and unbalances together."""
+    """Return the mounts and unbalances together."""
     table = elastic_scene(rng)
     table["counterweights"] = counterweights(rng, moving_mass(table["engine"]), 1)
     opened_stiffness(rng, table["mounts"], int(rng.integers(1, 3)))
@@ -641,7 +641,7 @@ def joint(rng: Generator) -> Table:
 
 
 def balance_on_elastic(rng: Generator) -> Table:
-    """Unbalances on mounts that are given."""
+    """Return the unbalances on mounts that are given."""
     table = elastic_scene(rng, inline(rng) if rng.random() < 0.5 else vee(rng))
     size = moving_mass(table["engine"])
     table["counterweights"] = counterweights(rng, size, int(rng.integers(1, 3)))
@@ -654,7 +654,7 @@ def balance_on_elastic(rng: Generator) -> Table:
 
 
 def uneven(rng: Generator) -> Table:
-    """Throws in line, some of them between bounds of their own, and weights at times."""
+    """Return the throws in line, some of them between bounds of their own, and weights at times."""
     engine = {"layout": "inline", **mechanism(rng), **spaced(rng)}
     angles: list[Any] = list(throws(rng, int(rng.integers(3, 6))))
     for k in rng.choice(len(angles) - 1, int(rng.integers(1, 3)), replace=False) + 1:
@@ -668,7 +668,7 @@ def uneven(rng: Generator) -> Table:
 
 
 def places(rng: Generator) -> Table:
-    """A shaft or two whose height, side or unbalance's place is open; angles given or open."""
+    """Return a shaft or two whose height, side or unbalance's place is open; angles given or open."""
     built = inline(rng) if rng.random() < 0.7 else vee(rng)
     size = moving_mass(built)
     table = {"engine": built, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
@@ -688,7 +688,7 @@ def places(rng: Generator) -> Table:
 
 
 def leads(rng: Generator) -> Table:
-    """Cranks that are geared to, or coupled with, another one at angles that are open; weights on them at times."""
+    """Return cranks geared to, or coupled with, another one at open angles, at times with weights."""
     engine, gas = {"layout": "parts", **mechanism(rng, plain=True), "cycle": "two-stroke"}, rng.random() < 0.5
     count, turning = int(rng.integers(1, 3)), float(rng.choice([-1, 1]))
     engine["shafts"] = [
@@ -734,7 +734,7 @@ def leads(rng: Generator) -> Table:
 
 
 def shared_leads(rng: Generator) -> Table:
-    """Opposed pistons with gas between them, the lead of one crank open."""
+    """Return the opposed pistons with gas between them, the lead of one crank open."""
     engine = opposed_piston(rng)
     engine.pop("rod_inertia_deficit", None)
     minimum = -float(round(rng.uniform(1.0, 25.0), 1)) if rng.random() < 0.5 else 0.0
@@ -755,7 +755,7 @@ def shared_leads(rng: Generator) -> Table:
 
 
 def banks(rng: Generator) -> Table:
-    """A vee twin whose bank angle or split pin is open, and weights on its crank."""
+    """Return a vee twin whose bank angle or split pin is open, and weights on its crank."""
     engine = {
         "layout": "vee",
         **mechanism(rng),
@@ -830,7 +830,7 @@ def rotary(rng: Generator) -> Table:
 
 
 def sizes(rng: Generator) -> Table:
-    """Sizes of the running gear and weights together, under stresses that a random design nearly has."""
+    """Return the sizes of the running gear and weights together, under stresses that a random design nearly has."""
     count = int(rng.integers(1, 3))
     engine = gas_engine(rng)
     while len(engine["throws"]) > 2:
@@ -898,7 +898,7 @@ def sizes(rng: Generator) -> Table:
 
 
 def worst_means(rng: Generator) -> Table:
-    """Another family at several operating points, the largest mean of any of which counts."""
+    """Return a problem of another family at several operating points, with the worst mean of them."""
     family = FAMILIES[str(rng.choice(OF_WORST_MEANS))]
     while len((table := family(rng))["operating_points"]) < 2:
         pass
@@ -914,7 +914,7 @@ def worst_means(rng: Generator) -> Table:
 
 
 def root_mean_quads(rng: Generator) -> Table:
-    """Another family with the root mean quad of its loads in place of their norms."""
+    """Return a problem of another family with root mean quads in place of its norms."""
     table = FAMILIES[str(rng.choice(OF_ROOT_MEAN_QUADS))](rng)
     objective = dict(table["objective"])
     terms = [objective] if "minimise" in objective else [dict(term) for term in objective["terms"]]
@@ -968,7 +968,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
 
 
 def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
-    """Some limits between what the best design without them has and what the one as given has, or under both."""
+    """Return limits between the best design without them and the initial one, or below both."""
     from attack.openings import Openings
     from attack.rivals import convex_rival, stars_of
 
@@ -1005,6 +1005,6 @@ def family_of(name: str) -> Callable[[Generator], Table]:
 
 
 def problem(family: str, seed: int) -> tuple[Table, Generator]:
-    """A problem, and the generator that goes on from there."""
+    """Return a problem, and the generator that goes on from there."""
     rng = np.random.default_rng([*family.encode(), seed])
     return with_limits(rng, {"title": f"{family} {seed}", **family_of(family)(rng)}), rng

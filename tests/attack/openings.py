@@ -29,7 +29,7 @@ def is_open(value: Any) -> bool:
 
 
 def middle(value: Any) -> float:
-    """A number, or where an open one starts."""
+    """Return a number, or where an open one starts."""
     if not is_open(value):
         return number(value)
     return number(value["start"]) if "start" in value else number(value["between"][0])
@@ -62,7 +62,7 @@ class Weight:
 
     @property
     def entries(self) -> int:
-        """Number of its entries in the vector."""
+        """Return the number of its entries in the vector."""
         if self.follows or self.minimum == self.maximum:
             return 0
         return 1 if self.sector and self.sector[0] == self.sector[1] else 2
@@ -123,7 +123,7 @@ class Openings:
 
     @cached_property
     def numbers(self) -> tuple[tuple[Path, float, float], ...]:
-        """Paths and bounds of open numbers, but sizes and angles of unbalances and the angles of even stars."""
+        """Return paths and bounds of open numbers, but sizes and angles of unbalances and the angles of even stars."""
         steps = self.table["engine"].get("throws") == "open" and "intervals" not in self.table.get("phasing", {})
         rows: list[tuple[Path, float, float]] = []
 
@@ -146,17 +146,17 @@ class Openings:
 
     @property
     def size(self) -> int:
-        """Entries of the vector."""
+        """Return the number of entries of the vector."""
         return len(self.numbers) + sum(w.entries for w in self.weights)
 
     @property
     def convex(self) -> bool:
-        """True if unbalances alone are open."""
+        """Return whether unbalances alone are open."""
         return not self.numbers and self.table["engine"].get("throws") != "open"
 
     @property
     def box(self) -> np.ndarray:
-        """Bounds of the entries, (size, 2); discs and sectors are `allowed` beside."""
+        """Return the bounds of the entries, (size, 2); discs and sectors are `allowed` beside."""
         rows = [(0.0, 1.0)] * len(self.numbers)
         for w in self.weights:
             rows += [(0.0, 1.0)] if w.entries == 1 else [(-1.0, 1.0)] * w.entries
@@ -171,7 +171,7 @@ class Openings:
         return slices
 
     def nearest(self, vector: np.ndarray) -> np.ndarray:
-        """The vector brought into its bounds, discs and sectors."""
+        """Return the vector brought into its bounds, discs and sectors."""
         out = np.clip(vector, *self.box.T) if self.size else vector
         for w, part in self.parts(out):
             if w.entries != 2:
@@ -188,7 +188,7 @@ class Openings:
         return self.nearest(vector)
 
     def scene(self, vector: np.ndarray, star: Table | None = None, order: tuple[int, ...] | None = None) -> Scene:
-        """The design of a vector; `told` replaces keys of [engine] (a star, a bank)."""
+        """Return the design of a vector; `told` replaces keys of [engine] (a star, a bank)."""
         table = {**self.table, **{key: copy.deepcopy(self.table[key]) for key in OPEN_TABLES if key in self.table}}
         table["engine"].update(star or {})
         for (path, low, high), share in zip(self.numbers, vector, strict=False):
@@ -213,7 +213,7 @@ class Openings:
         return list(rotors.values())
 
     def read(self, engine: Any, decisions: dict[str, float]) -> tuple[np.ndarray, Table]:
-        """The vector of an engine that was decided, and its throws and angles where these are open as a whole.
+        """Return vector of an engine that was decided, and its throws and angles where these are open as a whole.
 
         Numbers of mounts are taken from what is told of decisions, by their names.
 
@@ -246,7 +246,7 @@ class Openings:
         return star
 
     def _angles(self, engine: Any) -> tuple[list[float], float, float]:
-        """Throws, bank and split pin [rad]."""
+        """Return the throws, bank and split pin [rad]."""
         parts = engine.slider_cranks
         if self.table["engine"]["layout"] != "vee":
             return [p.throw for p in parts], 0.0, 0.0
@@ -294,7 +294,7 @@ def _at(table: Any, path: Path) -> Any:
 
 
 def _into_sector(point: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Nearest point of a sector of at most half a turn."""
+    """Return the nearest point of a sector of at most half a turn."""
     z, middle_angle, half = complex(*point), 0.5 * (low + high), 0.5 * (high - low)
     turned = z * cmath.exp(-1j * middle_angle)
     if abs(cmath.phase(turned)) <= half or turned == 0:

@@ -37,7 +37,7 @@ def unit_of(quantity: str) -> str:
 
 
 def scene(rng: Generator, most_points: int, plain: bool) -> Table:
-    """Engine, gas, points and a block on mounts, all given; `plain` has nothing that no bound knows."""
+    """Return the engine, gas, points and a block on mounts, all given; `plain` has nothing that no bound knows."""
     chance = rng.random()
     engine = gas_engine(rng) if chance < 0.5 else (inline, vee, boxer)[int(rng.integers(3))](rng)
     mass = block(rng)
@@ -209,7 +209,7 @@ def limits(rng: Generator, table: Table, count: int) -> list[Table]:
 
 
 def frequency_limit(rng: Generator, one: Designs, many: Designs, hard: bool) -> Table:
-    """Over, under or between natural frequencies of a design, or a least share of a motion."""
+    """Return a limit above, below or between natural frequencies of a design, or on a share of a motion."""
     f, every, chance = np.sort(one.blocks.modes[0][0]), many.blocks.modes[0], rng.random()
     if chance < 0.2:
         motions = [str(m) for m in rng.choice(["roll", "bounce", "pitch", "lateral"], 2, replace=False)]
@@ -234,7 +234,7 @@ def objective(entry: Table) -> Table:
 
 
 def any_mounts(rng: Generator) -> Table:
-    """Any numbers of mounts and weights open, any quantity minimised, up to three limited."""
+    """Return a problem with any open numbers of mounts and weights, any quantity, and up to three limits."""
     plain = rng.random() < 0.5
     table = scene(rng, 3, plain)
     if rng.random() < 0.3:
@@ -257,7 +257,7 @@ def any_mounts(rng: Generator) -> Table:
 
 
 def run_ups(rng: Generator) -> Table:
-    """A run-up limited or minimised, stiffness or a weight open."""
+    """Return a problem with a run-up limited or minimised, with stiffness or a weight open."""
     table = scene(rng, 1, True)
     top = si(table["operating_points"][0]["speed"])
     durations = {key: q(rng.uniform(0.3, 0.8), "s", 3) for key in ("time", "shut_down_time")}

@@ -47,7 +47,7 @@ def knows(table: Table) -> bool:
 
 
 def vector(model: OwnModel, decisions: dict[str, float]) -> np.ndarray:
-    """Values of decisions, angles in degrees as files have them."""
+    """Return the values of decisions, angles in degrees as files have them."""
     turning = [".angle" in o.name or ".turned." in o.name for o in model.open]
     return np.array(
         [
@@ -84,7 +84,7 @@ class Search:
         return np.clip((x - self.low) / (self.high - self.low), 0.0, 1.0)
 
     def both(self, shares: np.ndarray, model: OwnModel) -> tuple[np.ndarray, np.ndarray]:
-        """Objective (n,) and excesses (n, limits); where nothing answers, much of both."""
+        """Return the objective (n,) and excesses (n, limits); where nothing answers, much of both."""
         shares = np.atleast_2d(shares)
         self.looked_at += len(shares)
         try:
@@ -95,12 +95,12 @@ class Search:
         return np.where(np.isfinite(value), value, 1e9), np.where(np.isfinite(over), over, 1e9)
 
     def evaluate_design(self, shares: np.ndarray) -> tuple[float, float]:
-        """Objective and largest excess with every order."""
+        """Return the objective and largest excess with every order."""
         value, over = self.both(shares, self.model)
         return float(value[0]), float(over.max())
 
     def best(self, starts: list[np.ndarray], unit: float) -> tuple[float, float, np.ndarray, float]:
-        """Value (infinite if none keeps the limits), excess and shares of the best design, and the least excess."""
+        """Return value (infinite if none keeps the limits), excess and shares of the best design, and least excess."""
         limits = "constraints" in self.table
         goals = [self._charged(unit), *([self._violation] if limits else [])]
         ends = list(starts)
@@ -129,7 +129,7 @@ class Search:
         return self.both(shares, self.quick)[1].max(axis=1)
 
     def _evolved(self, goal: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:
-        """The best of the last generation, and another far from it."""
+        """Return the best of the last generation, and another far from it."""
         people = max(24, 8 * self.size)
         optimum = differential_evolution(
             lambda z: goal(z.T), [(0.0, 1.0)] * self.size, vectorized=True, updating="deferred", polish=False,
@@ -141,7 +141,7 @@ class Search:
         return [ranked[0], *ranked[far][:1]]
 
     def _slopes(self, unit: float) -> Callable[[np.ndarray], tuple[Any, ...]]:
-        """Objective, its slopes, excesses and theirs, by differences of one batch, kept for the last point."""
+        """Return objective, its slopes, excesses and theirs, by differences of one batch, kept for the last point."""
         last: dict[bytes, tuple[Any, ...]] = {}
 
         def slopes_at(z: np.ndarray) -> tuple[Any, ...]:
@@ -169,7 +169,7 @@ class Search:
         return np.clip(optimum.x, 0.0, 1.0)
 
     def _least_excess(self, start: np.ndarray, unit: float) -> np.ndarray:
-        """The least t that no excess is over."""
+        """Return the least t that no excess is over."""
         slopes, last = self._slopes(unit), np.append(np.zeros(self.size), 1.0)
         constraint = {
             "type": "ineq", "fun": lambda y: y[-1] - slopes(y[:-1])[2],
@@ -199,7 +199,7 @@ def reading(quantities: list[str], table: Table) -> float:
 
 
 def judge(verdict: Any, table: Table, result: Any, rng: np.random.Generator, calls: int) -> None:
-    """Complaints about a result."""
+    """Add complaints about a result."""
     if not open_numbers_of(table):
         return
     search = Search(table, rng, calls)
@@ -246,7 +246,7 @@ def judge(verdict: Any, table: Table, result: Any, rng: np.random.Generator, cal
 
 
 def _judge_limits(verdict: Any, table: Table, result: Any, search: Search, start: np.ndarray) -> None:
-    """Values of the limits of the final design."""
+    """Check the values of the limits of the final design."""
     design = search.model.designs(search.low + (search.high - search.low) * start[None])
     limits = {limit.name: limit for limit in result.limits}
     for entry in table.get("constraints", []):

@@ -31,7 +31,7 @@ UNITS = {
 
 
 def si(quantity: Any) -> float:
-    """A number of a problem file in SI units; without a unit as it is."""
+    """Return a number of a problem file in SI units; without a unit as it is."""
     if not isinstance(quantity, str):
         return float(quantity)
     number, unit = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.*)", quantity).groups()  # type: ignore[union-attr]
@@ -53,7 +53,7 @@ class Cylinder:
 
 
 def crank_radius(engine: Table) -> tuple[float, float]:
-    """Radius of the crank and length of the rod that make the stroke."""
+    """Return the radius of the crank and length of the rod that make the stroke."""
     stroke, offset = si(engine["stroke"]), si(engine.get("offset", 0.0))
 
     def rod(radius: float) -> float:
@@ -68,7 +68,7 @@ def crank_radius(engine: Table) -> tuple[float, float]:
 
 
 def cylinders_and_pins(engine: Table) -> tuple[list[Cylinder], list[tuple[float, float, float]]]:
-    """Slider-cranks of an inline engine, a vee or a boxer, and (x, angle, m r) of what turns with its throws."""
+    """Return slider-cranks of an inline engine, a vee or a boxer, and (x, angle, m r) of what turns with its throws."""
     radius, rod = crank_radius(engine)
     throws = [math.radians(float(t)) for t in engine["throws"]]
     common = (
@@ -106,7 +106,7 @@ def derivative(samples: np.ndarray) -> np.ndarray:
 
 
 def of_pistons(cylinders: list[Cylinder], turns: int, count: int) -> np.ndarray:
-    """Coefficients (count, 6), f = Re sum c_n e^(i n phi / turns), of pistons and rods at 1 rad/s."""
+    """Return the coefficients (count, 6), f = Re sum c_n e^(i n phi / turns), of pistons and rods at 1 rad/s."""
     phi, total = 2.0 * np.pi * np.arange(STEPS) / STEPS, np.zeros((6, STEPS))
     for c in cylinders:
         alpha = phi + c.throw - c.bank
@@ -135,7 +135,7 @@ def of_pistons(cylinders: list[Cylinder], turns: int, count: int) -> np.ndarray:
 
 
 def of_unbalance(x: float, place: complex, ratio: float, turns: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients (count, 6) of a unit unbalance at angle 0 and at a right angle, at 1 rad/s."""
+    """Return the coefficients (count, 6) of a unit unbalance at angle 0 and at a right angle, at 1 rad/s."""
     both = []
     for angle in (0.0, 0.5 * np.pi):
         phi = 2.0 * np.pi * np.arange(64) / 64
@@ -156,7 +156,7 @@ def of_unbalance(x: float, place: complex, ratio: float, turns: int, count: int)
 
 
 def _panels(bends: list[float], whole: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (panels, 16) of panels of at most 2 degrees between bends, and their weights."""
+    """Return the nodes (panels, 16) of panels of at most 2 degrees between bends, and their weights."""
     ends = np.unique(np.round([0.0, *(b % whole for b in bends), whole], 14))
     cuts = np.concatenate(
         [np.linspace(a, b, max(2, math.ceil((b - a) / math.radians(2.0)) + 1))[:-1] for a, b in pairwise(ends)]
@@ -203,7 +203,7 @@ class Stroke:
 
 
 def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
-    """Coefficients (HIGHEST + 1) of the roll moment of the gas in one cylinder that fires at 0."""
+    """Return the coefficients (HIGHEST + 1) of the roll moment of the gas in one cylinder that fires at 0."""
     top, bottom = s.dead
     whole = 2.0 * math.pi * s.turns
     high, low = float(s.height(top)), float(s.height(bottom))
@@ -236,7 +236,7 @@ def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
 
 
 def _mixed(gas: Table, motored: bool, target: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
-    """Pressure of the closed part of a Seiliger cycle, and where it bends besides."""
+    """Return the pressure of the closed part of a Seiliger cycle, and where it bends besides."""
     top, bottom = dead
     minimum, maximum = ends
     n1, n2 = float(gas.get("compression_exponent", 1.35)), float(gas.get("expansion_exponent", 1.30))
@@ -266,7 +266,7 @@ def _mixed(gas: Table, motored: bool, target: float, volume: Any, dead: Any, end
 
 
 def _released(gas: Table, motored: bool, target: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
-    """The same with finite heat release: p v^k grows by (k - 1) q v^(k - 1) db."""
+    """Return the same with finite heat release: p v^k grows by (k - 1) q v^(k - 1) db."""
     _, bottom = dead
     _, maximum = ends
     k = float(gas.get("heat_ratio", 1.35))
@@ -303,7 +303,7 @@ def _released(gas: Table, motored: bool, target: float, volume: Any, dead: Any, 
 
 
 def firing(cylinders: list[Cylinder], engine: Table) -> list[float]:
-    """Crank angle at which each fires: its first dead centre after the cylinder before it."""
+    """Return the crank angle at which each fires: its first dead centre after the cylinder before it."""
     turns, order = turns_of(engine), engine.get("firing_order")
     dead = [(c.bank - c.throw) % (2.0 * math.pi) for c in cylinders]
     if order is None:
@@ -323,7 +323,7 @@ def turns_of(engine: Table) -> int:
 
 
 def of_gas(gas: Table, point: Table, cylinders: list[Cylinder], engine: Table) -> np.ndarray:
-    """Coefficients (HIGHEST + 1) of the roll moment of all cylinders."""
+    """Return the coefficients (HIGHEST + 1) of the roll moment of all cylinders."""
     c, turns = cylinders[0], turns_of(engine)
     one = torque(gas, point, Stroke(c.radius, c.rod, c.offset, 0.25 * math.pi * si(engine["bore"]) ** 2, turns))
     later = np.exp(-1j * np.outer(np.arange(HIGHEST + 1), firing(cylinders, engine)) / turns)

@@ -21,7 +21,7 @@ MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
 def numbers(entry: Any, count: int) -> np.ndarray:
-    """(count, ...) of a number, a list of them, or what was put in for open ones."""
+    """Return an array (count, ...) of a number, a list of them, or what was put in for open ones."""
     if isinstance(entry, np.ndarray):
         return entry
     if isinstance(entry, list):
@@ -30,7 +30,7 @@ def numbers(entry: Any, count: int) -> np.ndarray:
 
 
 def crossed(r: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) with crossed(r) v = r x v."""
+    """Return an array (..., 3, 3) with crossed(r) v = r x v."""
     out = np.zeros((*r.shape, 3))
     x, y, z = np.moveaxis(r, -1, 0)
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
@@ -38,7 +38,7 @@ def crossed(r: np.ndarray) -> np.ndarray:
 
 
 def rotation(angles: np.ndarray) -> np.ndarray:
-    """Own axes as columns: about x, then y, then z, by (count, 3) [rad]."""
+    """Return the own axes as columns: about x, then y, then z, by (count, 3) [rad]."""
     turned = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
     for axis in range(3):
         e = np.zeros((len(angles), 3))
@@ -82,16 +82,16 @@ class Blocks:
     place: list[int]
 
     def along(self, along_axes: np.ndarray) -> np.ndarray:
-        """(..., mounts, 3, 3) of values along own axes (..., mounts, 3)."""
+        """Return an array (..., mounts, 3, 3) of values along own axes (..., mounts, 3)."""
         return (self.axes * along_axes[..., None, :]) @ np.swapaxes(self.axes, -1, -2)
 
     def summed(self, parts: np.ndarray) -> np.ndarray:
-        """(count, 6, 6) of (count, mounts, 3, 3)."""
+        """Return an array (count, 6, 6) of (count, mounts, 3, 3)."""
         return (np.swapaxes(self.moves, -1, -2) @ parts @ self.moves).sum(axis=1)
 
     @cached_property
     def at_rest(self) -> np.ndarray:
-        """Stiffness along own axes, what fluid tracks add at rest counted."""
+        """Return the stiffness along own axes, what fluid tracks add at rest counted."""
         out = self.stiff.copy()
         for m, axis, (_, bulge, chamber, _) in self.tracks:
             out[:, m, axis] += bulge * chamber / (bulge + chamber)
@@ -99,12 +99,12 @@ class Blocks:
 
     @cached_property
     def firmness(self) -> np.ndarray:
-        """(count, 6, 6)."""
+        """Return an array (count, 6, 6)."""
         return self.summed(self.along(self.at_rest))
 
     @cached_property
     def _laws(self) -> list[np.ndarray]:
-        """Stiffness at rest, what is lost of it, damping: (count, mounts, 3, 3)."""
+        """Return the stiffness at rest, what is lost of it, damping: (count, mounts, 3, 3)."""
         return [self.along(along_axes) for along_axes in (self.at_rest, self.loss, self.damping)]
 
     @cached_property
@@ -112,7 +112,7 @@ class Blocks:
         return [self.summed(law)[:, None] for law in self._laws]
 
     def _track(self, m: int, axis: int, fluid: tuple[float, ...], w: np.ndarray) -> np.ndarray:
-        """(count, n, 3, 3) of what a fluid track adds at w to what it has at rest."""
+        """Return an array (count, n, 3, 3) of what a fluid track adds at w to what it has at rest."""
         mass, bulge, chamber, drag = fluid
         z = chamber - mass * w**2 + 1j * w * drag
         more = bulge * z / (bulge + z) - bulge * chamber / (bulge + chamber)
@@ -126,7 +126,7 @@ class Blocks:
         return out
 
     def answer(self, w: np.ndarray, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forces and travel (count, n, mounts, 3) of orders at w (n,) [rad/s], wrench (count, n, 6)."""
+        """Return the forces and travel (count, n, mounts, 3) of orders at w (n,) [rad/s], wrench (count, n, 6)."""
         lost, speed = 1j * (w > 0.0)[:, None, None], w[:, None, None]
         k, h, c = self._sums
         left = k + lost * h + 1j * speed * c - speed**2 * self.mass
@@ -143,27 +143,27 @@ class Blocks:
         return self.joined(forces), travel
 
     def joined(self, forces: np.ndarray) -> np.ndarray:
-        """Forces of springs that stand in one place added up, those of others nought."""
+        """Return the forces of springs that stand in one place added up, those of others nought."""
         out = np.zeros_like(forces)
         for m, to in enumerate(self.place):
             out[..., to, :] += forces[..., m, :]
         return out
 
     def firm(self, wrench: np.ndarray) -> np.ndarray:
-        """Forces if the block did not accelerate, by stiffness at rest."""
+        """Return the forces if the block did not accelerate, by stiffness at rest."""
         return self.answer(np.zeros(wrench.shape[1]), wrench)[0]
 
     # --- at rest
 
     @cached_property
     def _root(self) -> np.ndarray:
-        """Inverse root of the mass, symmetric."""
+        """Return the inverse root of the mass, symmetric."""
         values, vectors = np.linalg.eigh(self.mass)
         return (vectors / np.sqrt(values)) @ vectors.T
 
     @cached_property
     def modes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies (count, 6) [Hz], and shares (count, motion, mode) of kinetic energy."""
+        """Return the frequencies (count, 6) [Hz], and shares (count, motion, mode) of kinetic energy."""
         squares, turned = np.linalg.eigh(self._root @ self.firmness @ self._root)
         v = self._root @ turned
         return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi), v * (self.mass @ v)
@@ -182,7 +182,7 @@ class Blocks:
         return np.linalg.norm(left, axis=-1)
 
     def raw_torque_roll(self, band: tuple[float, float]) -> np.ndarray:
-        """Least over squares of frequencies in a band [Hz]."""
+        """Return the least over squares of frequencies in a band [Hz]."""
         turning = np.concatenate([np.zeros(3), np.linalg.inv(self.mass[3:, 3:])[:, 0]])
         turning /= np.linalg.norm(turning)
         pulled, inert = self.firmness @ turning, self.mass @ turning
@@ -190,7 +190,7 @@ class Blocks:
         return np.linalg.norm(pulled - s[:, None] * inert, axis=-1)
 
     def static_answer(self, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Travel and forces (count, mounts, 3) under a load (6,) about the centre of gravity: the least energy."""
+        """Return travel and forces (count, mounts, 3) of least energy under a load (6,) about the centre of gravity."""
         gap, hard = self.stops[:, 0, None], self.stops[:, 1, None]
         count = len(self.moves)
         along_axes = np.einsum("bmki,bmkj->bmij", self.axes, self.moves)
@@ -227,7 +227,7 @@ class Blocks:
 
 
 def blocks(table: Table, count: int) -> Blocks:
-    """Designs of a file whose open numbers are arrays (count,)."""
+    """Return the designs of a file whose open numbers are arrays (count,)."""
     block, mounts = table["block"], table["mounts"]
     centre = np.array([si(v) for v in block.get("centre_of_gravity", [0.0, 0.0, 0.0])])
     mass = si(block["mass"]) * np.eye(6)

@@ -157,7 +157,7 @@ class OwnModel:
 
     @cached_property
     def inertia(self) -> np.ndarray:
-        """Coefficients (harmonics, 6) of pistons, rods and throws at 1 rad/s."""
+        """Return the coefficients (harmonics, 6) of pistons, rods and throws at 1 rad/s."""
         count = own_loads.HIGHEST + 1 if "gas" in self.table else 64 * self.turns + 1
         unit = own_loads.of_pistons(self.cylinders, self.turns, count)
         for x, throw, turning in self.pins:
@@ -166,7 +166,7 @@ class OwnModel:
         return unit
 
     def gas(self, point: Table) -> np.ndarray:
-        """Coefficients (harmonics, 6) of the gas at an operating point."""
+        """Return the coefficients (harmonics, 6) of the gas at an operating point."""
         out = np.zeros_like(self.inertia)
         if "gas" in self.table and point.get("gas", True) is not False:
             out[:, 3] = own_loads.of_gas(self.table["gas"], point, self.cylinders, self.table["engine"])
@@ -174,7 +174,7 @@ class OwnModel:
 
     @cached_property
     def _fixed(self) -> np.ndarray:
-        """Coefficients (points, harmonics, 6) of pistons, rods, throws and gas."""
+        """Return the coefficients (points, harmonics, 6) of pistons, rods, throws and gas."""
         both = zip(self.speeds, self.points, strict=True)
         return np.array([self.inertia * w**2 + self.gas(point) for w, point in both])
 
@@ -185,7 +185,7 @@ class OwnModel:
 
     @cached_property
     def harmonics(self) -> np.ndarray:
-        """Harmonics of the cycle that count."""
+        """Return the harmonics of the cycle that count."""
         size = np.abs(self._fixed).max(axis=(0, 2))
         if self.share > 0.0:
             # far above its modes a block answers with the inverse square of the order
@@ -194,7 +194,7 @@ class OwnModel:
         return np.flatnonzero(size > max(self.share, 1e-16) * np.max(size[np.isfinite(size)]))
 
     def unbalances(self, table: Table, count: int) -> dict[str, np.ndarray]:
-        """Complex (count,) of every weight."""
+        """Return the unbalance of every weight, complex, shape (count,)."""
         by_name: dict[str, np.ndarray] = {}
         for w in self.weights:
             entry = _at_names(table, w, self)
@@ -213,7 +213,7 @@ class OwnModel:
         return by_name
 
     def wrenches(self, unbalances: dict[str, np.ndarray], count: int) -> np.ndarray:
-        """(count, points, felt, 6)."""
+        """Return an array (count, points, felt, 6)."""
         out = np.broadcast_to(self._fixed[:, self.harmonics], (count, len(self.points), len(self.harmonics), 6)).copy()
         w2 = np.array(self.speeds) ** 2
         for w, (upright, aside) in zip(self.weights, self.of_weights, strict=True):
@@ -225,7 +225,7 @@ class OwnModel:
     # --- what is asked
 
     def closed(self, x: np.ndarray) -> Table:
-        """The file with values (count, open numbers) put in."""
+        """Return the file with values (count, open numbers) put in."""
         table = copy.deepcopy(self.table)
         for o, values in zip(self.open, x.T, strict=True):
             holder = table
@@ -243,7 +243,7 @@ def _array(numbers: Any, count: int) -> np.ndarray:
 
 
 def _at_names(table: Table, w: Weight, model: OwnModel) -> Table:
-    """Numbers of a weight with open ones put in."""
+    """Return the numbers of a weight with open ones put in."""
     for entry in table.get("counterweights", []):
         if entry["name"] == w.name or ("balance_factor" in entry and w.name.startswith(entry["name"] + " ")):
             return {**entry, **{k: w.entry[k] for k in ("turning", "shares") if k in w.entry}}
@@ -269,7 +269,7 @@ class Designs:
 
     @cached_property
     def _answers(self) -> dict[str, np.ndarray]:
-        """Coefficients (count, points, felt, mounts, 3)."""
+        """Return the coefficients (count, points, felt, mounts, 3)."""
         orders = self.model.harmonics / self.model.turns
         both = [self.blocks.answer(orders * w, self.wrench[:, p]) for p, w in enumerate(self.model.speeds)]
         return {
@@ -278,7 +278,7 @@ class Designs:
         }
 
     def coefficients(self, term: Table, channel: str) -> np.ndarray:
-        """(count, points that count, places, felt, components), and the weights of the points."""
+        """Return an array (count, points that count, places, felt, components), and the weights of the points."""
         keep = self._points(term)
         if channel in ON_BLOCK:
             series = self.wrench[:, keep][..., ON_BLOCK[channel]][:, :, None]
@@ -308,7 +308,7 @@ class Designs:
         return [names.index(n) for n in term.get("mounts", names)]
 
     def samples(self, c: np.ndarray) -> np.ndarray:
-        """(..., samples, components) of coefficients (..., felt, components)."""
+        """Return an array (..., samples, components) of coefficients (..., felt, components)."""
         n = self.model.samples
         full = np.zeros((*c.shape[:-2], n // 2 + 1, c.shape[-1]), complex)
         low = self.model.harmonics <= n // 2
@@ -340,7 +340,7 @@ class Designs:
         return self._largest(c[:, w > 0.0], length[:, w > 0.0])
 
     def _largest(self, c: np.ndarray, length: np.ndarray) -> np.ndarray:
-        """Largest length, sought between the samples by Newton's method."""
+        """Return the largest length, sought between the samples by Newton's method."""
         if self.model.share > 0.0:
             return length.max(axis=(1, 2, 3))
         n, h = length.shape[-1], 1j * self.model.harmonics
@@ -355,7 +355,7 @@ class Designs:
         return best.max(axis=(1, 2))
 
     def measure(self, term: Table) -> np.ndarray:
-        """(count,) of an objective's term or a limit's quantity."""
+        """Return an array (count,) of an objective's term or a limit's quantity."""
         norm, channel = norm_and_channel(term["quantity"])
         if norm:
             return self.norm(norm, term, channel)
@@ -464,7 +464,7 @@ class Designs:
 
     @cached_property
     def excesses(self) -> np.ndarray:
-        """(count, limits)."""
+        """Return an array (count, limits)."""
         limits = self.table.get("constraints", [])
         return (
             np.stack([self.violation(limit) for limit in limits], axis=1) if limits else np.full((self.count, 1), -1.0)

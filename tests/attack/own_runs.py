@@ -20,7 +20,7 @@ MEASURES = ("run-up force", "run-up travel", "run-up twist")
 
 
 def matrices(designs: Designs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Forces of mounts (count, mounts, 3, 6) by motion and by speed, and inverse of the mass; losses of E26."""
+    """Return forces of mounts (count, mounts, 3, 6) by motion and by speed, and inverse of the mass; losses of E26."""
     b = designs.blocks
     values, vectors = np.linalg.eigh(b.mass)
     root = (vectors / np.sqrt(values)) @ vectors.T
@@ -33,7 +33,7 @@ def matrices(designs: Designs) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def run_through(designs: Designs) -> dict[str, np.ndarray]:
-    """Largest of up and down, (count,) each."""
+    """Return the largest of up and down, (count,) each."""
     run_up: Table = designs.table["run_up"]
     top, model = si(run_up["up_to"]), designs.model
     peaks = {key: np.zeros(designs.count) for key in MEASURES}
@@ -58,7 +58,7 @@ def run_through(designs: Designs) -> dict[str, np.ndarray]:
 def _one(
     designs: Designs, loads: list[np.ndarray], orders: np.ndarray, run: tuple[float, float, float]
 ) -> dict[str, np.ndarray]:
-    """A run from rest at a first speed that changes by so much a second, for so long."""
+    """Return a run from rest at a first speed that changes by so much a second, for so long."""
     by_motion, by_speed, inverse = matrices(designs)
     back = np.swapaxes(designs.blocks.moves, -1, -2)
     k, c = (inverse @ (back @ part).sum(axis=1) for part in (by_motion, by_speed))

@@ -99,7 +99,7 @@ def lines_of(logs: Iterable[Path]) -> list[dict[str, Any]]:
 
 
 def mended(logs: Iterable[Path]) -> list[dict[str, Any]]:
-    """Entries with something wrong of problems that had nothing wrong when they were run last."""
+    """Return the entries with something wrong of problems that had nothing wrong when they were run last."""
     entries = entries_of(logs)
     last = {(line["family"], line["seed"]): line for line in entries}
     return [line for line in entries if line["wrong"] and not last[line["family"], line["seed"]]["wrong"]]
@@ -135,7 +135,7 @@ def family_row(family: str, lines: list[dict[str, Any]]) -> str:
 
 
 def page(logs: list[Path], names: list[str]) -> str:
-    """Figures by family, what was wrong, and what cannot be seen."""
+    """Return the figures by family, what was wrong, and what cannot be seen."""
     lines = lines_of(logs)
     by_kind = {name: [line for line in lines if line["family"] == name] for name in names}
     every = [line for group in by_kind.values() for line in group]

@@ -40,7 +40,7 @@ CHANNELS = (*FORCES, *OF_SHAFT)
 
 
 def signal(scene: Any, machine: Machine, channel: str, orders: list[float] | None) -> np.ndarray:
-    """(points, places, samples, d) at every operating point, of some orders alone where they are named."""
+    """Return a signal (points, places, samples, d) at every operating point, of some orders if they are named."""
     whole = np.stack([at(scene, machine, channel, k) for k in range(len(scene.points))])
     if orders is None:
         return whole
@@ -50,7 +50,7 @@ def signal(scene: Any, machine: Machine, channel: str, orders: list[float] | Non
 
 
 def irregularity(scene: Any, machine: Machine, weights: np.ndarray) -> float:
-    """The most of all points that count."""
+    """Return the largest degree of irregularity of the points that count."""
     if "flywheel" in scene.table:
         inertia = number(scene.table["flywheel"]["inertia"])
     else:
@@ -82,19 +82,19 @@ def gas_at(scene: Any, k: int) -> dict[str, Any] | None:
 
 
 def _moving(m: Mechanism, turns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places of crank pin and piston over the crank angle."""
+    """Return the places of crank pin and piston over the crank angle."""
     base = rod_end(m, angles(turns))
     return base, piston(base, m.rod, m.bank, m.offset)[1]
 
 
 def _between(m: Mechanism, turns: int, share: float) -> np.ndarray:
-    """A place on the rod, so far from the crank pin."""
+    """Return a place on the rod, so far from the crank pin."""
     base, end = _moving(m, turns)
     return base + share * (end - base)
 
 
 def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarray:
-    """Force of the gas on the piston, along its axis from the crank."""
+    """Return the force of the gas on the piston, along its axis from the crank."""
     if gas is None or m.fires is None:
         return np.zeros(SAMPLES)
     alike = replace(m, x=0.0, throw=0.0, bank=0.0, fires=None, piston_mass=0.0, pin_mass=0.0, shank=0.0)
@@ -106,13 +106,13 @@ def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarra
 
 @lru_cache(maxsize=64)
 def _over_crankcase(m: Mechanism, turns: int, gas: str) -> np.ndarray:
-    """Pressure over that of the crankcase, on a fine grid from firing: the same wherever the throw stands."""
+    """Return pressure over that of the crankcase, on a fine grid from firing: the same wherever the throw stands."""
     gas_keys = json.loads(gas)
     return seiliger(gas_keys, m, turns) - number(gas_keys.get("crankcase_pressure", ATMOSPHERE))
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Moment of b at a, in a plane of complex numbers."""
+    """Return the moment of b at a, in a plane of complex numbers."""
     return (np.conj(a) * b).imag
 
 
@@ -131,7 +131,7 @@ def _pushed(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) 
 
 
 def pressing_rod(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
-    """Along the cylinder what presses the rod, half of its shank at the piston, and across it what the wall does."""
+    """Return the force along the cylinder on the rod, with half of its shank, and across it of the wall."""
     _, end = _moving(m, turns)
     mass = m.piston_mass + 0.5 * m.shank
     inertia = mass * speed**2 * (slope(slope(end, turns), turns) * np.exp(-1j * m.bank)).real
@@ -157,7 +157,7 @@ def on_shaft(scene: Any, machine: Machine, pins: Any, speed: float) -> list[tupl
 
 
 def _on_bearings(scene: Any, machine: Machine, pins: np.ndarray, speed: float) -> np.ndarray:
-    """Each load on the two bearings beside it; what hangs over is levered up."""
+    """Return each load shared by the two bearings beside it; an overhung load acts by its lever."""
     places = [number(b["x"]) for b in scene.table["main_bearings"]]
     out = np.zeros((len(places), SAMPLES), complex)
     loads = on_shaft(scene, machine, pins, speed)
@@ -214,7 +214,7 @@ def _uneven(scene: Any, machine: Machine, k: int, wheel: float) -> float:
 
 
 def _twist(scene: Any, machine: Machine, torques: list[np.ndarray], speed: float) -> np.ndarray:
-    """Angle of each disc before the next one, from the front, shape (sections, samples, 1)."""
+    """Return the angle of each disc before the next one, from the front, shape (sections, samples, 1)."""
     keys, turns = scene.table["torsion"], machine.turns
     stiff = [number(keys["crank"]["stiffness"])] * (len(torques) - 1) + [number(keys["discs"][0]["shaft"]["stiffness"])]
     damping, loss = number(keys["cylinder_damping"]), keys["loss_factor"]

@@ -31,18 +31,18 @@ def modulus(diameter: float, bore: float = 0.0) -> float:
 
 
 def part(table: dict[str, Any], name: str) -> dict[str, float]:
-    """Numbers of a part of the running gear."""
+    """Return the numbers of a part of the running gear."""
     return {key: number(value) for key, value in table["running_gear"][name].items()}
 
 
 def end(table: dict[str, Any]) -> tuple[float, float]:
-    """Diameter and width of the crank pins."""
+    """Return the diameter and width of the crank pins."""
     entry = table["engine"]["big_end"]
     return number(entry["diameter"]), number(entry["width"])
 
 
 def weighed(table: dict[str, Any]) -> dict[str, Any]:
-    """[engine] with the masses of its running gear."""
+    """Return the [engine] with the masses of its running gear."""
     gear, engine = table.get("running_gear", {}), table["engine"]
     if "density" not in gear:
         return engine
@@ -85,14 +85,14 @@ def clearance(table: dict[str, Any], machine: Machine) -> float:
 
 
 def _neighbours(table: dict[str, Any], m: Mechanism) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The bearings before a throw and behind it."""
+    """Return the bearings before a throw and behind it."""
     ahead = [b for b in table["main_bearings"] if number(b["x"]) > m.x]
     behind = [b for b in table["main_bearings"] if number(b["x"]) < m.x]
     return min(ahead, key=lambda b: number(b["x"])), max(behind, key=lambda b: number(b["x"]))
 
 
 def stress(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
-    """(places, samples, d) at an operating point."""
+    """Return an array (places, samples, d) at an operating point."""
     table, speed, gas = scene.table, scene.speeds[k], plain_crankcase.gas_at(scene, k)
     across, width = end(table)
     if channel == "crank-pin pressure":

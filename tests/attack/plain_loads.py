@@ -26,7 +26,7 @@ PASCAL = {"Pa": 1.0, "bar": 1e5}
 
 
 def number(text: Any) -> float:
-    """Value of "3.5 kg" in its base unit, or of a bare number."""
+    """Return the value of "3.5 kg" in its base unit, or of a bare number."""
     if not isinstance(text, str):
         return float(text)
     value, _, unit = text.partition(" ")
@@ -99,7 +99,7 @@ def angles(turns: int, samples: int = SAMPLES) -> np.ndarray:
 
 
 def slope(signal: np.ndarray, turns: int) -> np.ndarray:
-    """Derivative by the crank angle of a periodic signal (complex)."""
+    """Return the derivative by the crank angle of a periodic signal (complex)."""
     c = np.fft.fft(signal)
     k = np.fft.fftfreq(len(signal), 1.0 / len(signal)) / turns
     c[np.abs(k) > LAST_ORDER] = 0.0
@@ -107,7 +107,7 @@ def slope(signal: np.ndarray, turns: int) -> np.ndarray:
 
 
 def piston(base: np.ndarray, rod: float, bank: float, offset: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Place along the cylinder, place in the plane, and angle of a rod that starts at `base`."""
+    """Return the place along the cylinder, place in the plane, and angle of a rod that starts at `base`."""
     turned = base * np.exp(-1j * bank)
     aside = turned.imag - offset
     along = turned.real + np.sqrt(rod**2 - aside**2)
@@ -115,7 +115,7 @@ def piston(base: np.ndarray, rod: float, bank: float, offset: float) -> tuple[np
 
 
 def rod_end(m: Mechanism, phi: np.ndarray) -> np.ndarray:
-    """Pin that carries the rod."""
+    """Return the pin that carries the rod."""
     pin = m.radius * np.exp(1j * (m.ratio * phi + m.throw))
     if m.knuckle is None:
         return pin
@@ -125,13 +125,13 @@ def rod_end(m: Mechanism, phi: np.ndarray) -> np.ndarray:
 
 
 def shank_of(m: Mechanism) -> list[tuple[float, float]]:
-    """Three points on a straight rod, from the crank pin, that have its mass, its centre and its inertia."""
+    """Return the three points on a straight rod, from the crank pin, that have its mass, its centre and its inertia."""
     aside = 0.5 * math.sqrt(0.6)
     return [(0.5 + k * aside, w / 18.0 * m.shank) for k, w in ((-1, 5), (0, 8), (1, 5))] if m.shank else []
 
 
 def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
-    """Wrench at unit speed, shape (samples, 6)."""
+    """Return the wrench at unit speed, shape (samples, 6)."""
     phi, out = angles(turns), np.zeros((SAMPLES, 6))
     base = rod_end(m, phi)
     energy = np.zeros(SAMPLES)
@@ -159,7 +159,7 @@ def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
 
 
 def lever_masses(m: Mechanism, lever: Lever, base: np.ndarray) -> tuple[list[tuple[float, np.ndarray]], np.ndarray]:
-    """Ram, lever and its weight with their places, and the angle of the lever, of a crank pin at `base`."""
+    """Return the ram, lever and its weight with their places, and the angle of the lever, of a crank pin at `base`."""
     axis = np.exp(1j * m.bank)
     angle = np.unwrap(np.angle(base / axis + 1j * lever.pivot))
     along, pivot = np.exp(1j * angle), -1j * lever.pivot
@@ -172,7 +172,7 @@ def lever_masses(m: Mechanism, lever: Lever, base: np.ndarray) -> tuple[list[tup
 
 
 def force_at(x: float, place: np.ndarray | complex, force: np.ndarray) -> np.ndarray:
-    """Wrench of a force across the crank axis."""
+    """Return the wrench of a force across the crank axis."""
     zero = np.zeros(len(force))
     return np.stack(
         [zero, force.imag, force.real, -(np.conj(place) * force).imag, -x * force.real, x * force.imag], axis=1
@@ -180,7 +180,7 @@ def force_at(x: float, place: np.ndarray | complex, force: np.ndarray) -> np.nda
 
 
 def rotor_load(x: float, place: complex, ratio: float, unbalance: complex, turns: int) -> np.ndarray:
-    """Wrench of an unbalance at unit speed."""
+    """Return the wrench of an unbalance at unit speed."""
     return force_at(x, place, unbalance * ratio**2 * np.exp(1j * ratio * angles(turns)))
 
 
@@ -188,12 +188,12 @@ def rotor_load(x: float, place: complex, ratio: float, unbalance: complex, turns
 
 
 def travel(m: Mechanism, alpha: np.ndarray) -> np.ndarray:
-    """Place of the piston along its cylinder at its own crank angles."""
+    """Return the place of the piston along its cylinder at its own crank angles."""
     return piston(m.radius * np.exp(1j * alpha), m.rod, 0.0, m.offset)[0]
 
 
 def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
-    """Absolute pressure on a fine grid of one cycle from the firing dead centre; the cut-off is found by trying."""
+    """Return the absolute pressure on a fine grid of one cycle from the firing dead centre, cut-off by search."""
     alpha = angles(turns, FINE)
     s = travel(m, alpha)
     top, bottom = (math.asin(m.offset / (m.rod + m.radius)), math.pi + math.asin(m.offset / (m.rod - m.radius)))
@@ -206,7 +206,7 @@ def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
 
 
 def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, whole: int) -> np.ndarray:
-    """Absolute pressure where a chamber is so far from its smallest volume, so many strokes after it fires."""
+    """Return absolute pressure where a chamber is so far from its smallest volume, so many strokes after it fires."""
     e, n1, n2 = (gas.get(k, d) for k, d in DEFAULTS.items() if k in ("compression_ratio", *EXPONENTS))
     intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
     peak, target = number(gas["peak_pressure"]), number(gas["imep"])
@@ -232,7 +232,7 @@ def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, who
 
 
 def unfired(gas: dict[str, Any], valves: str, m: Mechanism, turns: int) -> np.ndarray:
-    """Absolute pressure of a cylinder without combustion, as `seiliger`: valves that move, stay closed or open."""
+    """Return the absolute pressure without combustion, as `seiliger`, with valves that move, stay closed or open."""
     e, n = (gas.get(k, DEFAULTS[k]) for k in ("compression_ratio", "compression_exponent"))
     intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
     s = travel(m, angles(turns, FINE))
@@ -258,7 +258,7 @@ DEFAULTS = {"compression_ratio": 17.0, "compression_exponent": 1.35, "expansion_
 
 
 def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int, valves: str = "") -> np.ndarray:
-    """Coefficients of the roll moment of the gas on one piston, its firing at angle 0; `valves` if it does not fire."""
+    """Return the coefficients of the roll moment of the gas on one piston that fires at 0, or has `valves` instead."""
     if m.shape is not None:
         from attack.plain_rotary import spectrum
 
@@ -273,7 +273,7 @@ def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int, valves: str = "") 
 
 
 def shared_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
-    """The same of a chamber between two pistons, from the dead centre of one: its volume is what both leave."""
+    """Return the coefficients for a chamber between two pistons, from the dead centre of one."""
     assert m.partner is not None
     radius, rod, ahead = m.partner
     far, step = _with(m, radius=radius, rod=rod), 1e-4
@@ -298,7 +298,7 @@ def shared_torque(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
 
 
 def chamber_pressure(entry: dict[str, Any], x: np.ndarray, grows: np.ndarray) -> np.ndarray:
-    """Absolute pressure over the part of the stroke from where a chamber is smallest."""
+    """Return the absolute pressure over the part of the stroke from where a chamber is smallest."""
     if "pump" in entry:
         return np.where(grows, number(entry["pump"]["suction"]), number(entry["pump"]["delivery"]))
     steam = entry["steam"]
@@ -314,7 +314,7 @@ def chamber_pressure(entry: dict[str, Any], x: np.ndarray, grows: np.ndarray) ->
 
 
 def chambers_torque(gas: dict[str, Any], k: int, m: Mechanism) -> np.ndarray:
-    """Coefficients of the roll moment of all chambers of cylinder k, its own crank angle counted from zero."""
+    """Return coefficients of the roll moment of all chambers of cylinder k, its own crank angle counted from zero."""
     s = travel(m, angles(1, FINE))
     rise = slope(s.astype(complex), 1).real
     x = (s.max() - s) / np.ptp(s)
@@ -345,7 +345,7 @@ def turns_of(engine: dict[str, Any]) -> int:
 
 
 def machine(engine: dict[str, Any], order: list[int] | None = None) -> Machine:
-    """Mechanisms of [engine], every number closed."""
+    """Return the mechanisms of [engine], every number closed."""
     turns = turns_of(engine)
     build = {
         "inline": _inline, "vee": _vee, "boxer": _boxer, "opposed-piston": _opposed, "radial": _radial, "parts": _parts,
@@ -380,7 +380,7 @@ def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[
 
 
 def _yoke(entry: dict[str, Any]) -> dict[str, Any]:
-    """The quick stroke takes 1 / (1 + ratio) of a turn, between the two places where crank and lever are square."""
+    """Return the lever of a yoke whose quick stroke takes 1 / (1 + ratio) of a turn."""
     pivot, stroke = number(entry["pivot_distance"]), number(entry["stroke"])
     radius = pivot * math.cos(math.pi / (1.0 + entry["return_ratio"]))
     length = 0.5 * stroke * pivot / radius
@@ -412,7 +412,7 @@ def own_tables(e: dict[str, Any]) -> dict[int, dict[str, Any]]:
 
 
 def spots(e: dict[str, Any], count: int, banks: int) -> list[tuple[int, int]]:
-    """Bank (0 left, 1 right, as it stands) and place from the front of every cylinder by its number."""
+    """Return the bank (0 left, 1 right, as it stands) and place from the front of every cylinder by its number."""
     per, scheme = count // banks, e.get("numbering", "one bank after the other")
     if isinstance(scheme, list):
         return [divmod(scheme.index(n), per) for n in range(1, count + 1)]
@@ -424,7 +424,7 @@ def spots(e: dict[str, Any], count: int, banks: int) -> list[tuple[int, int]]:
 
 
 def distances(e: dict[str, Any], count: int) -> list[float]:
-    """Places along the crank from the front, at one distance or at a list of them."""
+    """Return the places along the crank from the front, at one distance or at a list of them."""
     spacing = e.get("cylinder_spacing", 1.0)
     if not isinstance(spacing, list):
         return stations(count, number(spacing))
@@ -433,7 +433,7 @@ def distances(e: dict[str, Any], count: int) -> list[float]:
 
 
 def _in_banks(e: dict[str, Any], banks: int, per_throw: int, angle: float, split: float = 0.0) -> list[Mechanism]:
-    """Pistons of one bank or two by their numbers, and then what else turns with the throws."""
+    """Return the pistons of one bank or two by their numbers, and then what else turns with the throws."""
     throws, rows, common = _radians(e["throws"]), own_tables(e), _common(e)
     count, row = len(throws) * per_throw, math.radians(e.get("row_angle", 0.0))
     at, per = spots(e, count, banks), count // banks
@@ -469,7 +469,7 @@ def _in_banks(e: dict[str, Any], banks: int, per_throw: int, angle: float, split
 
 
 def dead_centres(mechanisms: list[Mechanism]) -> list[float]:
-    """Angle of every crank at the top of its piston where these differ, else none."""
+    """Return the angle of every crank at the top of its piston where these differ, else none."""
     tops = [math.asin(m.offset / (m.rod + m.radius)) if m.rod else 0.0 for m in mechanisms]
     return tops if max(tops) - min(tops) > 1e-12 else [0.0] * len(tops)
 
@@ -576,7 +576,7 @@ def _radial(e: dict[str, Any]) -> list[Mechanism]:
 
 
 def firing_angles(mechanisms: list[Mechanism], order: list[int], turns: int) -> dict[int, float]:
-    """Crank angle at which each cylinder of an order fires: its first dead centre after the one before."""
+    """Return the crank angle at which each cylinder of an order fires: its first dead centre after the one before."""
     tops = dead_centres([m for m in mechanisms if m.piston_mass or m.bore])
     centres = {n: (mechanisms[n - 1].bank - mechanisms[n - 1].throw + tops[n - 1]) % (2.0 * math.pi) for n in order}
     now = centres[order[0]]
@@ -589,7 +589,7 @@ def firing_angles(mechanisms: list[Mechanism], order: list[int], turns: int) -> 
 
 
 def _fired(mechanisms: list[Mechanism], order: list[int], turns: int) -> list[Mechanism]:
-    """Cylinders with the crank angle of their throw's dead centre before which, or at which, they fire."""
+    """Return the cylinders with the crank angle of their throw's dead centre before which, or at which, they fire."""
     at = firing_angles(mechanisms, order, turns)
     tops = dead_centres([m for m in mechanisms if m.piston_mass or m.bore])
     return [_with(m, fires=at[k] - tops[k]) if k in at else m for k, m in enumerate(mechanisms)]
@@ -597,12 +597,12 @@ def _fired(mechanisms: list[Mechanism], order: list[int], turns: int) -> list[Me
 
 @lru_cache(maxsize=512)
 def _upright_spectrum(m: Mechanism, turns: int) -> np.ndarray:
-    """Coefficients of the transform of a mechanism's load, (n, 6)."""
+    """Return the coefficients of the transform of a mechanism's load, (n, 6)."""
     return np.fft.rfft(mechanism_load(m, turns), axis=0) / SAMPLES
 
 
 def engine_spectrum(engine: Machine) -> np.ndarray:
-    """Wrench of everything that moves with the cranks at unit speed; a throw that stands ahead moves earlier."""
+    """Return wrench of everything that moves with the cranks at unit speed; a throw that stands ahead moves earlier."""
     orders = np.arange(SAMPLES // 2 + 1)[:, None] / engine.turns
     total = np.zeros((SAMPLES // 2 + 1, 6), complex)
     for m in engine.mechanisms:
@@ -619,7 +619,7 @@ def _gas_spectrum(gas: str, m: Mechanism, turns: int, valves: str) -> np.ndarray
 
 
 def gas_spectrum(gas: dict[str, Any], engine: Machine, valves: dict[int, str] | None = None) -> np.ndarray:
-    """Roll moment of all cylinders, each at its firing angle; `valves` of those that do not fire, by their index."""
+    """Return the roll moment of all cylinders, each at its firing angle, with `valves` of unfired ones by index."""
     orders = np.arange(SAMPLES // 2 + 1)[:, None] / engine.turns
     total = np.zeros((SAMPLES // 2 + 1, 6), complex)
     if gas.get("chambers"):

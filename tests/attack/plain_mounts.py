@@ -16,13 +16,13 @@ GRAVITY = 9.80665
 
 
 def arm(r: np.ndarray) -> np.ndarray:
-    """Wrench about the origin of a force at r, (6, 3); its transpose is the motion of that point."""
+    """Return the wrench about the origin of a force at r, (6, 3); its transpose is the motion of that point."""
     x, y, z = r
     return np.vstack([np.eye(3), [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]])
 
 
 def turned_axes(degrees: list[Any]) -> np.ndarray:
-    """Own axes of a mount as columns, turned about x, then y, then z."""
+    """Return the own axes of a mount as columns, turned about x, then y, then z."""
     a, b, c = (math.radians(float(v)) for v in degrees)
     rx = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
     ry = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
@@ -37,7 +37,7 @@ class Rigid:
     transfer: np.ndarray
 
     def forces(self, orders: np.ndarray, wrench: np.ndarray, speed: float) -> np.ndarray:
-        """Coefficients (n, mounts, 3) of those of the wrench (n, 6)."""
+        """Return the coefficients (n, mounts, 3) of those of the wrench (n, 6)."""
         return np.einsum("mij,nj->nmi", self.transfer, wrench)
 
 
@@ -84,7 +84,7 @@ class Elastic:
         return self._sum(self.dampers)
 
     def motion(self, orders: np.ndarray, wrench: np.ndarray, speed: float) -> np.ndarray:
-        """Coefficients (n, 6) of the motion of the centre of gravity."""
+        """Return the coefficients (n, 6) of the motion of the centre of gravity."""
         w = (orders * speed)[:, None, None]
         about = wrench.copy()
         about[:, 3:] -= np.cross(self.centre, wrench[:, :3])
@@ -108,7 +108,7 @@ class Elastic:
         )
 
     def firm(self, wrench: np.ndarray) -> np.ndarray:
-        """Forces of a block that does not accelerate."""
+        """Return the forces of a block that does not accelerate."""
         about = wrench.copy()
         about[:, 3:] -= np.cross(self.centre, wrench[:, :3])
         q = np.linalg.solve(self.stiffness, about.T).T
@@ -116,7 +116,7 @@ class Elastic:
 
     @cached_property
     def frequencies(self) -> np.ndarray:
-        """Natural frequencies [Hz]."""
+        """Return the natural frequencies [Hz]."""
         squared = scipy.linalg.eigh(self.stiffness, self.mass, eigvals_only=True)
         return np.sqrt(np.maximum(squared, 0.0)) / (2.0 * math.pi)
 
@@ -131,7 +131,7 @@ class Elastic:
         return float(sum(d.sum() for d in self.diagonal))
 
     def torque_roll(self, frequency: float) -> float:
-        """Size of A t / w^2 - t where the mass is one, t the unit turning of the free block under a torque about x."""
+        """Return the size of A t / w^2 - t at unit mass, t the unit rotation of the free block under a roll torque."""
         torque = np.zeros(6)
         torque[3] = 1.0
         root = np.real(scipy.linalg.sqrtm(self.mass))
@@ -163,5 +163,5 @@ def elastic(mounts: dict[str, Any], block: dict[str, Any]) -> Elastic:
 
 
 def over_cycle(coefficients: np.ndarray) -> np.ndarray:
-    """Samples of a real signal from coefficients of the transform, first axis."""
+    """Return the samples of a real signal from coefficients of the transform, first axis."""
     return np.fft.irfft(coefficients * SAMPLES, n=SAMPLES, axis=0)

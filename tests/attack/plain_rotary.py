@@ -21,7 +21,7 @@ ALL = CHAMBERS * FINE
 
 
 def _mean_and_rest(f: np.ndarray) -> tuple[float, np.ndarray]:
-    """An integral over a turn as a mean slope, and a periodic part."""
+    """Return an integral over a turn as a mean slope, and a periodic part."""
     c = np.fft.rfft(f)
     k = np.arange(len(c))
     rest = np.fft.irfft(np.where(k > 0, c / (1j * np.where(k > 0, k, 1)), 0.0), len(f))
@@ -52,7 +52,7 @@ def _over(gas: str, shape: Shape, eccentricity: float) -> np.ndarray:
 
 
 def over(gas: dict[str, Any], m: Mechanism) -> np.ndarray:
-    """Pressure in one chamber over that behind it, from its firing on over three turns."""
+    """Return the pressure in one chamber over that behind it, from its firing on over three turns."""
     assert m.shape is not None
     return _over(json.dumps(gas, sort_keys=True), m.shape, m.radius)
 
@@ -63,7 +63,7 @@ def _of_all(one: np.ndarray) -> np.ndarray:
 
 
 def torque(gas: dict[str, Any], m: Mechanism) -> np.ndarray:
-    """On the shaft, from a firing on: work per angle."""
+    """Return the torque on the shaft from a firing on, as work per angle."""
     assert m.shape is not None
     v = volume(m.shape, m.radius)
     # a chamber's volume is a cosine and its double at the most
@@ -74,7 +74,7 @@ def torque(gas: dict[str, Any], m: Mechanism) -> np.ndarray:
 
 
 def on_eccentric(gas: dict[str, Any] | None, m: Mechanism, speed: float) -> np.ndarray:
-    """Force of the rotor on its eccentric at the steps of the plain model, its flanks pressed along their normals."""
+    """Return the force of the rotor on its eccentric at each step, its flanks pressed along their normals."""
     assert m.shape is not None
     assert m.fires is not None
     phi = angles(1)
@@ -88,12 +88,12 @@ def on_eccentric(gas: dict[str, Any] | None, m: Mechanism, speed: float) -> np.n
 
 
 def spectrum(gas: dict[str, Any], m: Mechanism) -> np.ndarray:
-    """Coefficients of the roll moment of the gas of one rotor that fires at angle 0."""
+    """Return the coefficients of the roll moment of the gas of one rotor that fires at angle 0."""
     return np.fft.rfft(torque(gas, m))[: SAMPLES // 2 + 1] / FINE
 
 
 def apex(engine: dict[str, Any], speed: float, derivative: int) -> float:
-    """Largest speed or acceleration of an apex, by differences of its places."""
+    """Return the largest speed or acceleration of an apex, by differences of its places."""
     e, radius = number(engine["eccentricity"]), number(engine["rotor_radius"])
     steps = 720
     turn = 2.0 * np.pi * np.arange(steps) / steps

@@ -22,7 +22,7 @@ ON_BLOCK = {"shaking force": slice(0, 3), "rocking couple": slice(4, 6), "roll m
 
 
 def norm_and_channel(quantity: str) -> tuple[str, str]:
-    """ "peak to peak", "mount force" of "peak to peak mount force"; no norm where it has none."""
+    """Return the "peak to peak", "mount force" of "peak to peak mount force"; no norm where it has none."""
     for norm in NORMS:
         if quantity.startswith(f"{norm} "):
             return norm, quantity[len(norm) + 1 :]
@@ -30,7 +30,7 @@ def norm_and_channel(quantity: str) -> tuple[str, str]:
 
 
 def circumsphere(points: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-    """Smallest ball about few points: centre, radius and the weights of its points (all subsets are tried)."""
+    """Return smallest ball about few points: centre, radius and the weights of its points (all subsets are tried)."""
     best = (points[0], math.inf, np.eye(len(points))[0])
     for size in range(1, min(len(points), points.shape[1] + 1) + 1):
         for chosen in itertools.combinations(range(len(points)), size):
@@ -54,7 +54,7 @@ def circumsphere(points: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
 
 
 def smallest_ball(signal: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Diameter of the smallest ball that holds a path, the samples it rests on, and twice their pull on it."""
+    """Return diameter of the smallest ball that holds a path, the samples it rests on, and twice their pull on it."""
     scale = float(np.abs(signal).max()) or 1.0
     v = signal / scale
     if v.shape[1] == 1:
@@ -109,7 +109,7 @@ def _gas_load(
 
 
 def states_of(point: Table, cylinders: int) -> list[Table]:
-    """A point, or one for each cylinder that misfires alone."""
+    """Return a point, or one for each cylinder that misfires alone."""
     if point.get("misfire") != "each":
         return [point]
     weight = point.get("weight", 1.0) / cylinders
@@ -120,7 +120,7 @@ def states_of(point: Table, cylinders: int) -> list[Table]:
 
 
 def unfired_of(point: Table) -> tuple[tuple[int, str], ...]:
-    """Index of each cylinder without combustion, and what its valves do."""
+    """Return the index of each cylinder without combustion, and what its valves do."""
     misfires = [(k - 1, "moving") for k in point.get("misfire", ())]
     return (*misfires, *((k - 1, point.get("cut_valves", "closed")) for k in point.get("cut", ())))
 
@@ -168,7 +168,7 @@ class Scene:
 
     @cached_property
     def wrenches(self) -> list[np.ndarray]:
-        """Coefficients (n, 6) of the transform of every operating point; gas is real and does not grow with speed."""
+        """Return the coefficients (n, 6) of every operating point; gas is real and does not grow with speed."""
         unit = _unit_load(self._key, self.order).copy()
         for _, x, place, ratio, unbalance, *_ in self.rotors:
             unit += np.fft.rfft(plain_loads.rotor_load(x, place, ratio, unbalance, self.turns), axis=0) / SAMPLES
@@ -183,12 +183,12 @@ class Scene:
 
     @cached_property
     def loaded_orders(self) -> np.ndarray:
-        """Indices of the orders that carry a load."""
+        """Return the indices of the orders that carry a load."""
         size = np.max([np.abs(w).max(axis=1) for w in self.wrenches], axis=0)
         return np.flatnonzero(size > 1e-13 * size.max())
 
     def coefficients(self, channel: str, orders: list[float] | None) -> list[np.ndarray]:
-        """Per operating point (n, places, d)."""
+        """Return the per operating point (n, places, d)."""
         keep = self.loaded_orders
         if orders is not None:
             keep = np.array([k for k in keep if any(abs(self.orders[k] - o) < 1e-9 for o in orders)], dtype=int)
@@ -208,7 +208,7 @@ class Scene:
         return signals
 
     def signal(self, term: Table) -> np.ndarray:
-        """(points, places, samples, d) of a load that is asked for."""
+        """Return an array (points, places, samples, d) of a load that is asked for."""
         _, channel = norm_and_channel(term["quantity"])
         if channel in plain_crankcase.CHANNELS:
             return plain_crankcase.signal(self, _machine(self._key, self.order), channel, term.get("orders"))
@@ -229,7 +229,7 @@ class Scene:
         return np.array([point.get("weight", 1.0) * c for point, c in zip(self.points, counted, strict=True)])
 
     def measure(self, term: Table) -> float:
-        """The number of an objective's term or a limit."""
+        """Return the number of an objective's term or a limit."""
         norm, channel = norm_and_channel(term["quantity"])
         if norm:
             return norm_of(norm, self.signal(term), self.weights(term))
@@ -294,12 +294,12 @@ class Scene:
 
     @cached_property
     def worst(self) -> float:
-        """Largest excess over all limits."""
+        """Return the largest excess over all limits."""
         return max((self.violation(limit) for limit in self.table.get("constraints", [])), default=-1.0)
 
 
 def terms_of(table: Table) -> list[Table]:
-    """Terms of the objective."""
+    """Return the terms of the objective."""
     objective = table.get("objective", {})
     if "terms" in objective:
         return list(objective["terms"])

@@ -76,7 +76,7 @@ def best_star(openings: Openings, maximum: int, target: float = np.inf) -> Rival
 
 
 def least_broken(openings: Openings, maximum: int) -> Rival | None:
-    """The design, of any star, that passes its limits least."""
+    """Return the design, of any star, that passes its limits least."""
     stars = list(stars_of(openings))
     if not stars or len(stars) > maximum:
         return None
@@ -89,7 +89,7 @@ def least_broken(openings: Openings, maximum: int) -> Rival | None:
 
 
 def charged(openings: Openings, unit: float, star: Table | None = None):
-    """Objective in its unit, and much more for what limits are passed by; infinite where nothing answers."""
+    """Return the objective in its unit, and much more for what limits are passed by; infinite where nothing answers."""
 
     def value(vector: np.ndarray) -> float:
         scene = openings.scene(openings.nearest(vector.copy()), star)
@@ -106,7 +106,7 @@ def charged(openings: Openings, unit: float, star: Table | None = None):
 def local_rival(
     openings: Openings, rng: np.random.Generator, starts: list[np.ndarray], calls: int, star: Table | None = None
 ) -> Rival:
-    """Random designs and evolution, then a simplex from the best of them and from `starts`."""
+    """Return the random designs and evolution, then a simplex from the best of them and from `starts`."""
     unit = openings.scene(starts[0], star).objective or 1.0
     value = charged(openings, unit, star)
     pool = [*starts, *(openings.random(rng) for _ in range(calls // 4))]

@@ -60,7 +60,7 @@ def commit() -> str:
 
 
 def drawn(family: str, seed: int) -> tuple[Table, np.random.Generator]:
-    """A problem of any family, and the generator that goes on from there."""
+    """Return a problem of any family, and the generator that goes on from there."""
     made = OWN_FAMILIES.get(family) or CROSSINGS.get(family)
     if made is None:
         return problem(family, seed)
@@ -83,7 +83,7 @@ def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
 
 
 def finer(family: str, seed: int, folder: Path, effort: int) -> Verdict:
-    """The same by a plain model that knows more of peaks and of the bends of gas torque, in a process of its own."""
+    """Return the verdict of a plain model that resolves peaks and bends of gas torque, from its own process."""
     log = folder / "finer.jsonl"
     words = ["run", family, "--from", str(seed), "--number", "1", "--log", str(log), "--effort", str(effort)]
     subprocess.run(

@@ -15,7 +15,7 @@ Generator = np.random.Generator
 
 
 def numbering(rng: Generator, count: int, banks: int, along: bool = False) -> Table:
-    """Keys that number the cylinders; a list only where numbers need not run along the crank."""
+    """Return the keys that number the cylinders; a list only where numbers need not run along the crank."""
     keys: Table = {}
     kind = str(rng.choice(["usual", "alternating", "list"]))
     if kind == "list" and not along:
@@ -33,7 +33,7 @@ def numbering(rng: Generator, count: int, banks: int, along: bool = False) -> Ta
 
 
 def weighed(rng: Generator, engine: Table, keys: list[str], share: float = 0.6) -> list[Table]:
-    """Rows of single cylinders, near the numbers of the engine."""
+    """Return the rows of single cylinders, near the numbers of the engine."""
     near = {
         "reciprocating_mass": (0.8, 1.2, "kg"), "rotating_mass": (0.0, 1.0, "kg"), "bore": (0.95, 1.0, "m"),
         "stroke": (0.9, 1.1, "m"), "rod_length": (0.95, 1.1, "m"), "second_reciprocating_mass": (0.8, 1.2, "kg"),
@@ -65,7 +65,7 @@ def uneven_spacing(rng: Generator, places: int) -> Table:
 
 
 def banked(rng: Generator) -> Table:
-    """In line, a vee or a boxer, at times in narrow rows."""
+    """Return an engine in line, a vee or a boxer, at times with narrow rows."""
     layout = str(rng.choice(["inline", "vee", "boxer"]))
     throws = {"inline": (1, 6), "vee": (1, 4), "boxer": (1, 3)}[layout]
     count = int(rng.integers(*throws)) * (2 if layout == "boxer" else 1)
@@ -108,7 +108,7 @@ def radial(rng: Generator) -> Table:
 
 
 def fired(rng: Generator, engine: Table) -> Table | None:
-    """An order of firing at angles that no two share, and who never fires; None where the throws have none."""
+    """Return an order of firing at angles that no two share, and who never fires; None where the throws have none."""
     count, turns = count_of(engine), 2 if engine["cycle"] == "four-stroke" else 1
     idle = {int(k) + 1 for k in rng.permutation(count)[: int(rng.random() < 0.3)]} if count > 2 else set()
     rows = {n: row for row in engine.get("single_cylinders", []) for n in [row["cylinders"]]}
@@ -138,7 +138,7 @@ def _row(rows: dict[Any, Table], n: int) -> Table:
 
 
 def gas_of(rng: Generator, engine: Table) -> Table:
-    """Gas that differs, and a pump on a piston that never fires."""
+    """Return the gas that differs, and a pump on a piston that never fires."""
     gas: Table = {
         "model": "seiliger", "peak_pressure": f.q(rng.uniform(60, 85), "bar"), "imep": f.q(rng.uniform(6.5, 9), "bar"),
     }  # fmt: skip
@@ -159,7 +159,7 @@ def gas_of(rng: Generator, engine: Table) -> Table:
 
 
 def gas(rng: Generator) -> Table:
-    """Cylinders of own masses, bores and gas, one that never fires at times."""
+    """Return the cylinders of own masses, bores and gas, one that never fires at times."""
     while True:
         engine = banked(rng)
         engine["bore"] = f.q(rng.uniform(0.06, 0.1), "m")
@@ -175,7 +175,7 @@ def gas(rng: Generator) -> Table:
 
 
 def stars(rng: Generator) -> Table:
-    """Weighed cylinders on open throws in line, at times with rows, offsets and gas of their own."""
+    """Return the weighed cylinders on open throws in line, at times with rows, offsets and gas of their own."""
     count = int(rng.integers(3, 6))
     engine = f.star_of({"layout": "inline", **f.mechanism(rng, plain=True)}, count)
     engine |= {**numbering(rng, count, 1, along=True), **uneven_spacing(rng, count)}

@@ -13,7 +13,7 @@ from attack.plain_scene import Table
 
 
 def angles_of(engine: Table) -> Iterator[tuple[float, float]]:
-    """Bank and split pin [deg] for which cylinders of one throw can fire evenly; one of the two may be open."""
+    """Yield bank and split pin [deg] for which cylinders of one throw can fire evenly; one of the two may be open."""
     turns = 2 if engine["cycle"] == "four-stroke" else 1
     step = 360.0 * math.gcd(turns, engine["cylinders"]) / engine["cylinders"]
     bank, split = engine["bank_angle"], engine.get("split_pin_angle", 0.0)
@@ -49,7 +49,7 @@ def even_stars(engine: Table) -> Iterator[Table]:
 
 
 def fired_stars(engine: Table, turns: int, count: int) -> Iterator[Table]:
-    """The same of cylinders in line that differ: by the order in which they fire, which turns every throw."""
+    """Yield cylinders in line that differ, by their firing order, which turns every throw."""
     upright = machine({**engine, "throws": [0.0] * count, "firing_order": None}).mechanisms
     centres = [math.degrees(m.bank + top) for m, top in zip(upright, dead_centres(list(upright)), strict=True)]
     fires = [360.0 * turns * slot / count for slot in range(count)]
@@ -65,7 +65,7 @@ def fired_stars(engine: Table, turns: int, count: int) -> Iterator[Table]:
 
 
 def _stands(steps: int, throws: int, offsets: list[int], count: int) -> Iterator[tuple[int, ...]]:
-    """Steps of all throws, the first at 0, so that every step has as many dead centres."""
+    """Yield the steps of all throws, the first at 0, so that every step has as many dead centres."""
     for rest in itertools.product(range(steps), repeat=throws - 1):
         places = (0, *rest)
         fired = Counter((p + o) % steps for p in places for o in offsets)

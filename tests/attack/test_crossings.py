@@ -32,7 +32,7 @@ def test_no_claim_falls(family: str) -> None:
 
 
 def raised(result: Result) -> Result:
-    """A bound that is a hundredth over the value."""
+    """Return the result with a bound one percent above its value."""
     assert result.certificate is not None
     assert result.objective is not None
     bound = 1.01 * result.objective.value

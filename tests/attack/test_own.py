@@ -27,7 +27,7 @@ DRAWN = NAMED + [("any mounts", seed) for seed in range(24) if ("any mounts", se
 
 
 def with_values(table: Table, x: np.ndarray, model: OwnModel) -> Table:
-    """The file with its open numbers as they are in a design, which `evaluate` takes as given."""
+    """Return the file with its open numbers as they are in a design, which `evaluate` takes as given."""
     out = model.closed(x[None])
     for number, value in zip(model.open, x, strict=True):
         holder = out

@@ -37,7 +37,7 @@ def doubt(*results: Any) -> float:
 
 
 def prices(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
-    """A price lies between the gain of a looser and the loss of a tighter limit: values are convex in a limit."""
+    """Return complaints about prices outside the gain of a looser and the loss of a tighter limit."""
     result = solved(table, folder)
     if result.objective is None or not is_global(result) or not result.objective.value:
         return []
@@ -78,7 +78,7 @@ def _times(text: Any, factor: float) -> Any:
 
 
 def monotony(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
-    """A limit loosened, or one more weight, is never worse."""
+    """Return complaints if a looser limit or one more weight makes the optimum worse."""
     result = solved(table, folder)
     wider = copy.deepcopy(table)
     wider.setdefault("counterweights", []).append(
@@ -132,7 +132,7 @@ def factor_of(unit: str, sizes: tuple[float, float, float]) -> float:
 
 
 def relabelled(table: Table, rng: np.random.Generator) -> Table:
-    """The same parts in another order, under names of their own."""
+    """Return the same parts in another order, under names of their own."""
     other = copy.deepcopy(table)
     for holder, key in ((other, "counterweights"), (other, "balancer_shafts"), (other["mounts"], "places")):
         if key in holder:
@@ -141,7 +141,7 @@ def relabelled(table: Table, rng: np.random.Generator) -> Table:
 
 
 def mirrored(table: Table) -> Table:
-    """Front and back swapped: an engine in line."""
+    """Return the front and back swapped: an engine in line."""
     other = copy.deepcopy(table)
     if isinstance(other["engine"].get("throws"), list):
         other["engine"]["throws"].reverse()
@@ -171,7 +171,7 @@ def negated(value: Any) -> Any:
 
 
 def invariance(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
-    """Relabelled, mirrored and rescaled problems are worth the same, with the same kind of proof."""
+    """Return complaints if a relabelled, mirrored or rescaled problem has another value or kind of proof."""
     result = solved(table, folder)
     others: dict[str, tuple[Table, float]] = {"relabelled": (relabelled(table, rng), 1.0)}
     if table["engine"]["layout"] == "inline" and "gas" not in table:

@@ -82,12 +82,12 @@ COSTS = "| size | time [s] | core-seconds | files of the store | MB | peak memor
 
 
 def each_of(costs: list[Cost]) -> float:
-    """Processor time of one more [s], of the two largest runs: what starting and tables take is left out."""
+    """Return the processor time of one more [s] from the two largest runs, without start and tables."""
     return (costs[-1].cores - costs[-2].cores) / (costs[-1].size - costs[-2].size)
 
 
 def timed(folder: Path, *words: str) -> tuple[float, float, int]:
-    """A study to its end: seconds by the clock and of processors, and most memory that a process of it had [byte]."""
+    """Run a study, and return seconds by the clock and of processors, and its largest memory [byte]."""
     began = time.perf_counter()
     process = subprocess.Popen(
         [*clusters.LAUFRUHE, "study", "s.toml", "--out", "out", *words], cwd=folder, env=clusters.environment(),
@@ -129,7 +129,7 @@ def overheads(cluster: clusters.Cluster) -> tuple[list[str], float]:
 
 
 def shared(folder: Path) -> tuple[list[str], list[tuple[int, float, float, float]]]:
-    """The same study on more and more workers, beside one process."""
+    """Return the lines of the same study on more and more workers, compared with one process."""
     serial = clusters.prepared(folder / "serial", **SHARED)
     wall, alone, _ = timed(serial, "--jobs", "1")
     rows, costs = [f"| one process | {wall:.1f} | {alone:.1f} | | |"], []
@@ -149,7 +149,7 @@ def shared(folder: Path) -> tuple[list[str], list[tuple[int, float, float, float
 
 
 def killed(folder: Path, count: int) -> list[str]:
-    """Runs with something killed at random moments, each beside one run that nothing stopped."""
+    """Return the lines of runs with processes killed at random, each compared with an uninterrupted run."""
     serial = clusters.prepared(folder / "serial", **SMALL)
     seconds, _, _ = timed(serial, "--jobs", "1")
     tried, wrong = Counter[str](), []
@@ -199,7 +199,7 @@ def _attacked(cluster: clusters.Cluster, here: Path, rng: random.Random, seconds
 
 
 def full_disk(folder: Path) -> list[str]:
-    """A store that takes so many bytes and then raises what a full disk does; then one with room."""
+    """Return the lines of a store that fills a disk after so many bytes, then of one with room."""
     serial, here = clusters.prepared(folder / "whole", **SMALL), clusters.prepared(folder / "full", **SMALL)
     timed(serial, "--jobs", "1")
     words = [sys.executable, "-c", FULL.format(ROOM), "study", "s.toml", "--out", "out", "--jobs", "1"]
@@ -214,7 +214,7 @@ def full_disk(folder: Path) -> list[str]:
 
 
 def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list[Cost]]:
-    """Random designs and random scenes of growing numbers, in one process."""
+    """Return the costs of growing numbers of random designs and of random scenes, in one process."""
     costs: tuple[list[Cost], list[Cost]] = [], []
     for which, part, maximum in ((0, "designs", evaluations), (1, "engines", solves)):
         # the two largest of evaluations have no tables, and differ in draws alone
@@ -230,7 +230,7 @@ def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list
 
 
 def at_once(folder: Path, solves: int) -> Cost:
-    """Random scenes on all processors, by one command."""
+    """Return the cost of random scenes on all processors, by one command."""
     here = clusters.prepared(folder, draws=1, scenes=solves, few=500, points=2)
     wall, _, memory = timed(here)
     cores, done, files, size = stored(clusters.draws_in(here / "out"), "engines")
@@ -239,7 +239,7 @@ def at_once(folder: Path, solves: int) -> Cost:
 
 
 def plan(evaluated: list[Cost], solved: list[Cost], handing: float) -> list[str]:
-    """Estimate the time of a thousand million draws of each kind; `handing` is the time to hand out a piece [ms]."""
+    """Return the estimated time of 1e9 draws of each kind; `handing` is the time to hand out a piece [ms]."""
     rows = []
     for name, costs, chunk in (("evaluations", evaluated, 100_000), ("proven solves", solved, 10_000)):
         seconds, pieces = 1e9 * each_of(costs), 1e9 / chunk
@@ -255,7 +255,7 @@ def plan(evaluated: list[Cost], solved: list[Cost], handing: float) -> list[str]
 
 
 def drawn(sizes: tuple[list[Cost], list[Cost]], counts: list[tuple[int, float, float, float]]) -> None:
-    """Growth with size and with workers."""
+    """Draw the growth with size and with workers."""
     series = (("evaluations", "blue", sizes[0]), ("proven solves", "orange", sizes[1]))
     grown: list[p.Mark] = [
         p.Line([c.size for c in costs], [c.cores for c in costs], colour, name, marker="o")
@@ -290,7 +290,7 @@ def command_line() -> argparse.Namespace:
 
 
 def at_least(minimum: int) -> Callable[[str], int]:
-    """Numbers so large that what one more takes shows beside what starting takes."""
+    """Return numbers so large that one more takes longer than the start."""
 
     def number(word: str) -> int:
         if int(float(word)) < minimum:

@@ -58,7 +58,7 @@ def way(name: str) -> Iterator[None]:
 
 
 def decided(problem: Problem, model: AffineModel) -> tuple[float, float, float]:
-    """Processor time [s] from a model to an optimum, its objective and its relative gap."""
+    """Return the processor time [s] from a model to an optimum, its objective and its relative gap."""
     start = time.process_time()
     optimum, _ = unbalances._refine(problem, model, numerical_zero(problem), 0)
     spent = time.process_time() - start
@@ -68,7 +68,7 @@ def decided(problem: Problem, model: AffineModel) -> tuple[float, float, float]:
 
 
 def ready() -> list[tuple[Problem, AffineModel]]:
-    """Ready problems with open unbalances alone, and their models."""
+    """Return the ready problems with open unbalances alone, and their models."""
     paths = sorted((ROOT / "problems").glob("*.toml"))
     problems = [load(path) for path in paths if "study" not in tomllib.loads(path.read_text(encoding="utf-8"))]
     problems = [p for p in problems if open_kinds(p) == {Kind.UNBALANCE} and p.objective and not p.extras]

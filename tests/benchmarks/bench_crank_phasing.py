@@ -98,7 +98,7 @@ class Row:
 
 
 def seconds(work: Callable[[], object], repeats: int = 3) -> float:
-    """Median processor time."""
+    """Return the median processor time."""
     times = []
     for _ in range(repeats):
         times.append(spent(work))
@@ -108,12 +108,12 @@ def seconds(work: Callable[[], object], repeats: int = 3) -> float:
 
 
 def quickest(work: Callable[[], object], repeats: int = 9) -> float:
-    """Least processor time: what the code needs, without what else the machine does."""
+    """Return the least processor time: what the code needs, without what else the machine does."""
     return min(seconds(work, 1) for _ in range(repeats))
 
 
 def problem_of(text: str) -> Problem:
-    """A problem from its text."""
+    """Return a problem from its text."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "bench.toml"
         path.write_text(text, encoding="utf-8")
@@ -127,7 +127,7 @@ def space_of(throws: int) -> StarSpace:
 
 
 def rows() -> list[Row]:
-    """The two-order couple, size by size."""
+    """Return the two-order couple, size by size."""
     out = []
     for n in SIZES:
         space = space_of(n)
@@ -147,7 +147,7 @@ def rows() -> list[Row]:
 
 
 def joint(n: int) -> tuple[str, ...]:
-    """Counterweights free, mean mount force: cuts beside solving every star."""
+    """Return the row of free counterweights under mean mount force: cuts, compared with every star solved."""
     problem = problem_of(TEXT.format(n=n) + JOINT_TEXT)
     phasing = problem.phasing
     assert phasing is not None
@@ -170,7 +170,7 @@ def joint(n: int) -> tuple[str, ...]:
 
 
 def scoring() -> list[tuple[str, ...]]:
-    """Stars scored a second, and how many the machine could add up."""
+    """Return the stars scored a second, and how many the machine could add up."""
     rng = np.random.default_rng(0)
     a, b = np.ones(1024), np.ones(1024)
     loops = 20_000
@@ -193,7 +193,7 @@ def scoring() -> list[tuple[str, ...]]:
 
 
 def memory() -> list[tuple[str, ...]]:
-    """Largest memory of an enumeration."""
+    """Return the largest memory of an enumeration."""
     out = []
     for n in (8, 9, 10, 11):
         tracemalloc.start()
@@ -205,7 +205,7 @@ def memory() -> list[tuple[str, ...]]:
 
 
 def table(head: tuple[str, ...], body: list[tuple[str, ...]]) -> str:
-    """Markdown."""
+    """Return the Markdown table."""
     lines = [f"| {' | '.join(head)} |", f"| {' | '.join('---:' for _ in head)} |"]
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in body)])
 
@@ -233,12 +233,12 @@ def growth(results: list[Row]) -> None:
 
 
 def grid_text(grid: Table) -> str:
-    """A table of the report."""
+    """Return a table of the report."""
     return f"**{grid.title}**\n\n{table(grid.head, list(grid.rows))}\n\n{grid.note}"
 
 
 def rankings() -> str:
-    """The ready problems' stars and firing orders."""
+    """Return the ready problems' stars and firing orders."""
     parts = [
         "# Crank stars and firing orders, ranked",
         "Each part is one ready problem; `laufruhe solve` makes it again.",

@@ -52,19 +52,19 @@ SOLVED = (
 
 
 def seconds(work: Callable[[], object], repeats: int = 5) -> float:
-    """Least of a few calls, after one that warms caches: others may use the machine too."""
+    """Return the least of a few calls, after one that warms caches: others may use the machine too."""
     work()
     return min(spent(work) for _ in range(repeats))
 
 
 def product_rate() -> float:
-    """Additions and multiplications a second of a large matrix product on one core."""
+    """Return the additions and multiplications a second of a large matrix product on one core."""
     a = np.random.default_rng(0).normal(size=(1200, 1200))
     return 2.0 * 1200**3 / seconds(lambda: a @ a, 12)
 
 
 def automatic(problem: Problem) -> Problem:
-    """The problem at fidelity `auto` with its default tolerance."""
+    """Return the problem at fidelity `auto` with its default tolerance."""
     return problem.at(replace(problem.fidelity, tolerance=DEFAULT_TOLERANCE))
 
 
@@ -99,7 +99,7 @@ def _solve_time(problem: Problem) -> float:
 
 
 def batches() -> list[str]:
-    """Batches of random designs with all preparation, exact and automatic in turns."""
+    """Return the rows of batches of random designs, exact and automatic in turns."""
     lines = [
         "## Many designs, automatic at 1e-3 against exact",
         "",
@@ -192,7 +192,7 @@ def growth() -> tuple[list[str], list[tuple[str, Sequence[int], list[float], flo
 
 
 def draw(rows: list[tuple[str, Sequence[int], list[float], float]], path: Path) -> None:
-    """Four lines on one panel, sizes over the smallest of each."""
+    """Draw four lines on one panel, sizes over the smallest of each."""
     style = importlib.import_module("laufruhe.plots.style")
     from matplotlib.ticker import FuncFormatter, LogLocator
 

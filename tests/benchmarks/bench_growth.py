@@ -40,7 +40,7 @@ def scene(
     cylinders: int = 4, *, counterweights: int = 0, shafts: int = 2, points: int = 1, mounts: int = 4,
     samples: int | None = None, orders: int | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """A row of cylinders on rigid mounts; every counterweight has two open numbers, every shaft one."""
+    """Return a row of cylinders on rigid mounts; every counterweight has two open numbers, every shaft one."""
     length = 0.125 * cylinders
     tables: dict[str, Any] = {
         "title": "row",
@@ -72,7 +72,7 @@ def scene(
 
 
 def star(cylinders: int) -> dict[str, Any]:
-    """Crank and firing order open."""
+    """Return a problem with open crank and firing order."""
     engine = {**scene(cylinders)["engine"], "throws": "open", "firing_order": "open"}
     points = [{"speed": "600 rpm"}]
     return {
@@ -82,13 +82,13 @@ def star(cylinders: int) -> dict[str, Any]:
 
 
 def two_stroke_star(cylinders: int) -> dict[str, Any]:
-    """Crank of a two-stroke open: each throw on a step of its own, so that some couple is left."""
+    """Return a two-stroke with an open crank, each throw on its own step, so that some couple remains."""
     tables = star(cylinders)
     return {**tables, "engine": {**tables["engine"], "cycle": "two-stroke"}, "phasing": {"best": 1}}
 
 
 def crank(cylinders: int, gas: bool) -> dict[str, Any]:
-    """Crank and firing order of a two-stroke open, on rigid mounts: each throw on a step of its own."""
+    """Return a two-stroke on rigid mounts with open crank and firing order, each throw on its own step."""
     tables = scene(cylinders, shafts=0)
     engine = {**tables["engine"], "cycle": "two-stroke", "bore": "100 mm", "throws": "open", "firing_order": "open"}
     fired = {"model": "wiebe", "imep": "5.5 bar", "start": -5, "duration": 50, "compression_ratio": 17}
@@ -96,7 +96,7 @@ def crank(cylinders: int, gas: bool) -> dict[str, Any]:
 
 
 def elastic(springs: int, points: int = 1, cylinders: int = 4) -> dict[str, Any]:
-    """So many open stiffnesses of four mounts."""
+    """Return a problem with so many open stiffnesses of four mounts."""
     left = iter(range(springs))
     places = []
     for k, (x, y) in enumerate([(0.3, 0.2), (0.32, -0.22), (-0.4, 0.2), (-0.38, -0.21)]):
@@ -123,7 +123,7 @@ def elastic(springs: int, points: int = 1, cylinders: int = 4) -> dict[str, Any]
 
 
 def evaluated(tables: dict[str, Any]) -> float:
-    """Seconds of one evaluation from nothing, the least of several."""
+    """Return the seconds of one evaluation from nothing, the least of several."""
     problem = load(tables)
 
     def work() -> float:
@@ -142,12 +142,12 @@ def evaluated(tables: dict[str, Any]) -> float:
 
 
 def solved(tables: dict[str, Any]) -> float:
-    """Seconds of one solve."""
+    """Return the seconds of one solve."""
     return proven(tables)[0]
 
 
 def proven(tables: dict[str, Any]) -> tuple[float, str]:
-    """Seconds of one solve, and how good its answer is known to be."""
+    """Return the seconds of one solve, and how good its answer is known to be."""
     problem = load(tables)
     began = time.process_time()
     result = solve(problem)
@@ -257,7 +257,7 @@ LARGE = (
 
 
 def one_cylinder() -> dict[str, Any]:
-    """A single-cylinder at 144 samples."""
+    """Return a single-cylinder at 144 samples."""
     return scene(1, shafts=1, samples=144)
 
 
@@ -270,7 +270,7 @@ DESIGNS = (
 
 
 def many_designs(source: Any, count: int) -> float:
-    """Seconds of so many designs with random unbalances, evaluated in one call; each design has the whole circle."""
+    """Return the seconds of so many random designs in one call, each with unbalances anywhere in the circle."""
     problem, random = load(source), np.random.default_rng(1)
     designs = {decision.name: random.uniform(decision.lower, decision.upper, count) for decision in problem.decisions}
     designs |= {decision.angle_name: random.uniform(0.0, math.tau, count) for decision in problem.decisions}
@@ -297,7 +297,7 @@ def exponent(sizes: Sequence[int], times: Sequence[float]) -> float:
 
 
 def factor(sizes: Sequence[int], times: Sequence[float]) -> float:
-    """For each further one, over the larger half."""
+    """Return the factor of time for each further one, over the larger half."""
     first = len(sizes) // 2
     return float(np.exp(np.polyfit(sizes[first:], np.log(times[first:]), 1)[0]))
 

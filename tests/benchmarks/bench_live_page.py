@@ -82,13 +82,13 @@ UPDATE = """async ({ selector, told, share }) => {
 
 
 def twelve() -> Problem:
-    """Twelve cylinders at two operating points, two counterweights with their angles open."""
+    """Return twelve cylinders at two operating points with two counterweights, angles open."""
     text = TWELVE.read_text(encoding="utf-8")
     return load(text.replace("[gas]", SECOND_POINT + "[gas]", 1))
 
 
 def report(problem: Problem, folder: Path) -> Path:
-    """The HTML report of the solved problem, without pictures."""
+    """Return the HTML report of the solved problem, without pictures."""
     result = solve(problem)
     path = folder / f"{problem.name}.html"
     page = as_html(result_document(result, [], "laufruhe"), {}, sliders(result))
@@ -97,7 +97,7 @@ def report(problem: Problem, folder: Path) -> Path:
 
 
 def frames(page: Page, path: Path) -> tuple[list[float], float]:
-    """Milliseconds of work in every frame of a drag, and processor time of the page's thread for one of them."""
+    """Return milliseconds of work in every frame of a drag, and processor time of the page's thread for one of them."""
     page.goto(path.as_uri())
     page.locator("[data-decision]").first.wait_for()
     script = DRAG.replace("SLIDER", "0")
@@ -110,13 +110,13 @@ def frames(page: Page, path: Path) -> tuple[list[float], float]:
 
 
 def spent_by(session: CDPSession) -> float:
-    """Processor time of all tasks of the page's thread until now: script, style, layout, painting [s]."""
+    """Return the processor time of all tasks of the page's thread until now: script, style, layout, painting [s]."""
     metrics = {metric["name"]: metric["value"] for metric in session.send("Performance.getMetrics")["metrics"]}
     return float(metrics["TaskDuration"])
 
 
 def updates(page: Page, selector: str, name: str) -> list[float]:
-    """Milliseconds from an input event to the end of the frame that shows it."""
+    """Return the milliseconds from an input event to the end of the frame that shows it."""
     script, times = UPDATE.replace("SLIDER", "0"), []
     for k in range(UPDATES + 5):
         times.append(
@@ -126,7 +126,7 @@ def updates(page: Page, selector: str, name: str) -> list[float]:
 
 
 def loads(problem: Problem, path: Path) -> None:
-    """Forces on the mounts, affine in all that is open, as a framework would be given them."""
+    """Write the forces on the mounts, affine in all open numbers, for a page of another framework."""
 
     def at(x: np.ndarray) -> np.ndarray:
         widths = [decision.set.width for decision in problem.decisions]
@@ -144,7 +144,7 @@ def loads(problem: Problem, path: Path) -> None:
 
 
 def in_dash(python: str, problem: Problem, page: Page, folder: Path) -> list[float]:
-    """The same loads on a page of Dash."""
+    """Return the milliseconds of the same loads on a page of Dash."""
     loads(problem, folder / "loads.npz")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

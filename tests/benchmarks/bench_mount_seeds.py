@@ -22,7 +22,7 @@ STARS = 12
 
 
 def elastic_problems() -> list[Problem]:
-    """Ready problems that leave mounts open."""
+    """Return the ready problems that leave mounts open."""
     return [problem for problem in map(load, ELASTIC) if problem.mount_decisions]
 
 

@@ -35,7 +35,7 @@ SAMPLES = 96
 
 
 def seconds(work: Callable[[], object], minimum: float = 0.5) -> float:
-    """Best time of one call over at least half a second of calls."""
+    """Return the best time of one call over at least half a second of calls."""
     best, whole = math.inf, 0.0
     while whole < minimum:
         last = spent(work)
@@ -44,7 +44,7 @@ def seconds(work: Callable[[], object], minimum: float = 0.5) -> float:
 
 
 def one_speed(problem: Problem) -> list[str]:
-    """Frequency domain against rigid bodies in time, both to 1e-6 of the peak."""
+    """Return the row of the frequency domain and of rigid bodies in time, both to 1e-6 of the peak."""
     # the reference has no gas
     mounting, point = mounting_in(problem.engine), replace(problem.points[-1], gas=None)
     wrench = shaking_loads(problem.engine, point, problem.fidelity)
@@ -114,7 +114,7 @@ def many_speeds(problem: Problem) -> list[str]:
 
 
 def joint(problem: Problem) -> list[str]:
-    """Balance and mounts together: this project and SLSQP with finite differences, from the same starts."""
+    """Return the row of balance with mounts: this package, and SLSQP with differences, from the same starts."""
     problem = replace(problem, search=replace(problem.search, starts=STARTS))
     started = processor_seconds()
     result = solve_joint(problem)
@@ -165,7 +165,7 @@ class _LateError(Exception):
 
 
 def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tuple[float, float, bool]:
-    """Objective, seconds, and whether all limits are kept, from one start."""
+    """Return the objective, seconds, and whether all limits are kept, from one start."""
     places, rotors = problem.mount_decisions, problem.unbalances
     low = np.array([d.lower for d in places] + [-d.upper for d in rotors for _ in range(2)])
     high = np.array([d.upper for d in places] + [d.upper for d in rotors for _ in range(2)])
@@ -174,7 +174,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
     point = np.clip((np.concatenate([mounts, columns]) - low) / (high - low), 0.0, 1.0)
 
     def evaluate_design(y: np.ndarray) -> tuple[float, np.ndarray]:
-        """Objective, and the room under every limit."""
+        """Return the objective, and the room under every limit."""
         x = low + y * (high - low)
         unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
         at = evaluate(problem, problem.design([*unbalances, *x[:count].tolist()]), SAMPLES)

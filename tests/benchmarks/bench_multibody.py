@@ -56,26 +56,26 @@ class Scene:
     integrator: Any
 
     def simulated(self, steps: int) -> FloatArray:
-        """Mount forces of one turn from the simulation, from its first step on."""
+        """Return the mount forces of one turn from the simulation, from its first step on."""
         loads = self.multibody.simulate(self.machine, steps, run_in=0, integrator=self.integrator)
         return mount_forces(self.engine, loads.reactions)
 
     def integration_seconds(self, steps: int) -> float:
-        """Processor time of one turn; building the system and reading its forces are not counted."""
+        """Return the processor time of one turn; building the system and reading its forces are not counted."""
         model = self.multibody.build(self.machine, 0.0)
         return spent(lambda: self.multibody.integrate(model, steps, steps, self.integrator))
 
     def analytic(self) -> FloatArray:
-        """Mount forces over the working cycle from the analytic loads."""
+        """Return the mount forces over the working cycle from the analytic loads."""
         return rigid_mounting(self.engine.mounts).forces(shaking_loads(self.engine, self.point)).sample(SAMPLES)
 
     def exact(self, steps: int) -> FloatArray:
-        """Analytic mount forces where the simulation has its own."""
+        """Return the analytic mount forces where the simulation has its own."""
         angles = math.tau * np.arange(steps) / steps
         return mount_forces(self.engine, shaking_loads(self.engine, self.point).values(angles))
 
     def problem(self) -> Problem:
-        """The same engine with two counterweights open, for the mean mount force."""
+        """Return the same engine with two counterweights open, for the mean mount force."""
         weights = tuple(Rotor(name, x, 0j, radius=0.08) for name, x in (("front", 0.2), ("rear", -0.2)))
         decisions = tuple(Decision(w.name, "kg m", Sector(0.1), 0j, (RotorDrive(w.name, 1.0),)) for w in weights)
         engine = replace(self.engine, rotors=(*self.engine.rotors, *weights))
@@ -83,23 +83,23 @@ class Scene:
         return Problem("bench", "bench", engine, (self.point,), decisions, objective)
 
     def designs(self) -> Callable[[FloatArray], FloatArray]:
-        """Exact mount forces at the same angles of the same engine with other counterweights (P1)."""
+        """Return the exact mount forces at the same angles of the same engine with other counterweights (P1)."""
         _, norm = AffineModel(self.problem()).at(SAMPLES).terms[0]
         return norm.rows
 
     def lengthened(self, factor: float) -> Scene:
-        """Other rods, so that nothing can be remembered from an evaluation before."""
+        """Return the scene with other rods, so that no evaluation is remembered."""
         rods = tuple(replace(part, rod_length=factor * part.rod_length) for part in self.engine.slider_cranks)
         return replace(self, engine=replace(self.engine, slider_cranks=rods))
 
 
 def mount_forces(engine: Engine, wrench: FloatArray) -> FloatArray:
-    """Forces on rigid mounts, shape (samples, mounts, 3) [N]."""
+    """Return the forces on rigid mounts, shape (samples, mounts, 3) [N]."""
     return np.asarray(np.einsum("mij,nj->nmi", rigid_mounting(engine.mounts).maps, wrench))
 
 
 def scene() -> Scene:
-    """The four-cylinder of the validation tests on four mounts."""
+    """Return the four-cylinder of the validation tests on four mounts."""
     # exudyn reads this on import: the build without range checks
     vars(sys)["exudynFast"] = True
     multibody = import_module("validation.multibody")
@@ -109,7 +109,7 @@ def scene() -> Scene:
 
 
 def error(scene: Scene, steps: int) -> float:
-    """Largest difference of a mount force over the largest mount force, after a first tenth of a turn.
+    """Return the largest difference of a mount force over the largest mount force, after a first tenth of a turn.
 
     The analytic loads are exact in the step; what is measured is the simulation.
     """
@@ -119,7 +119,7 @@ def error(scene: Scene, steps: int) -> float:
 
 
 def least_steps(scene: Scene) -> tuple[int, float]:
-    """Fewest steps a turn that reach the wanted error, or those that come nearest."""
+    """Return the fewest steps a turn within the tolerance, or those that come nearest."""
     tried = []
     for steps in STEPS:
         tried.append((steps, error(scene, steps)))
@@ -129,7 +129,7 @@ def least_steps(scene: Scene) -> tuple[int, float]:
 
 
 def peak_memory(scene: Scene) -> int:
-    """Most memory that the analytic evaluation takes above what was there before, kept tables included [bytes]."""
+    """Return the peak memory of the analytic evaluation above that before it, with cached tables [bytes]."""
     tracemalloc.start()
     scene.analytic()
     _, peak = tracemalloc.get_traced_memory()
@@ -138,19 +138,19 @@ def peak_memory(scene: Scene) -> int:
 
 
 def same_rods_again(scene: Scene) -> float:
-    """Processor time of an evaluation that remembers order coefficients of the rods and no loads."""
+    """Return the processor time of an evaluation that remembers order coefficients of the rods and no loads."""
     forget()
     return spent(scene.analytic)
 
 
 def of_others(evaluated: Callable[[Any], object], designs: Sequence[Any]) -> float:
-    """Processor time of each of some designs that differ in their counterweights from one before."""
+    """Return the processor time of each of some designs that differ in their counterweights from one before."""
     evaluated(designs[0])
     return spent(lambda: [evaluated(design) for design in designs]) / len(designs)
 
 
 def in_turns(scene: Scene, steps: int) -> tuple[float, ...]:
-    """Medians of both simulations, analytic with new rods, again, and with new counterweights in two ways, in turns."""
+    """Return the medians of both simulations, and of the analytic forces in four ways, in turns."""
     plain = replace(scene, integrator=scene.multibody.Integrator(tolerance=1e-8, reuse=False, sparse=False))
     scene.integration_seconds(steps), scene.analytic()
     designs, problem, rounds = scene.designs(), scene.problem(), []

@@ -21,7 +21,7 @@ LAWS = ("even within", "normal", "at their limits")
 
 
 def drawn(tolerances: Tolerances, random: np.random.Generator, count: int, how: str) -> np.ndarray:
-    """Errors of engines."""
+    """Return the errors of engines."""
     if how == "at their limits":
         errors = random.choice([-1.0, 1.0], (count, tolerances.count))
         for model in (c for c in tolerances.columns if c.stop - c.start > 1):
@@ -33,7 +33,7 @@ def drawn(tolerances: Tolerances, random: np.random.Generator, count: int, how: 
 
 
 def of_law(tolerances: Tolerances, law: Law) -> list:
-    """The tolerances, their errors of one law."""
+    """Return the tolerances with errors of one law."""
     return [replace(t, law=law) for t in tolerances.tolerances]
 
 

@@ -52,7 +52,7 @@ bound, and the reading of the changed problem, whatever else runs on the machine
 
 
 def measured(name: str, control: str, folder: Path) -> np.ndarray:
-    """Milliseconds to the frame, to the answer, and of the server's processor, shape (events, 3)."""
+    """Return the milliseconds to the frame, to the answer, and of the server's processor, shape (events, 3)."""
     path = folder / f"{name}.toml"
     path.write_bytes((ROOT / "problems" / path.name).read_bytes())
     words = [sys.executable, "-c", RUN, "page", str(path), "--no-browser"]

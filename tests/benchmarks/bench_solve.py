@@ -61,19 +61,19 @@ def seconds(command: list[str], compiled: str) -> Times:
 
 
 def in_turns(package: Callable[[], Times], other: Callable[[], Times], repeats: int) -> tuple[Times, Times]:
-    """Medians of two things measured in turns, so that both see the same machine."""
+    """Return the medians of two things measured in turns, so that both see the same machine."""
     package(), other()
     pairs = [(package(), other()) for _ in range(repeats)]
     return middle([a for a, _ in pairs]), middle([b for _, b in pairs])
 
 
 def middle(runs: list[Times]) -> Times:
-    """Medians of both times."""
+    """Return the medians of both times."""
     return statistics.median(a for a, _ in runs), statistics.median(b for _, b in runs)
 
 
 def command_rows() -> list[Row]:
-    """Whole commands against bare imports, both with one thread."""
+    """Return the whole commands against bare imports, both with one thread."""
     python, laufruhe = sys.executable, [sys.executable, "-m", "laufruhe"]
     checked, solved = ([str(PROBLEMS / f"{name}.toml") for name in names] for names in (CHECKED, SOLVED))
     pairs = [
@@ -95,7 +95,7 @@ def command_rows() -> list[Row]:
 
 
 def resolve_rows() -> list[Row]:
-    """Re-solves of a sweep over speed against the cone solver's own time on the same programs."""
+    """Return the re-solves of a sweep over speed against the cone solver's own time on the same programs."""
     problem = load(PROBLEM)
     rows = []
     for samples in (72, 180, 720):
@@ -113,12 +113,12 @@ def resolve_rows() -> list[Row]:
 
 
 def duration_text(value: float, digits: int) -> str:
-    """A number; a dash where none was measured."""
+    """Return a number; a dash where none was measured."""
     return "-" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def at_speed(problem: Problem, samples: int, factor: float) -> AffineProblem:
-    """The problem at another speed in forces over speed squared."""
+    """Return the problem at another speed in forces over speed squared."""
     point = replace(problem.points[0], speed=factor * problem.points[0].speed)
     rated = AffineModel(problem).at(samples)
     slower = AffineModel(replace(problem, points=(point,))).at(samples)

@@ -55,7 +55,7 @@ Answer = tuple[str, float, float, str]
 
 
 def best(work: Callable[[int], object], calls: int = CALLS) -> float:
-    """Least processor time of a call [ms] over several rounds; every call has a number that none had before."""
+    """Return the least processor time of a call over several rounds, each with a new number [ms]."""
     numbers, lowest = count(), float("inf")
     for _ in range(ROUNDS):
         began = time.process_time()
@@ -66,7 +66,7 @@ def best(work: Callable[[int], object], calls: int = CALLS) -> float:
 
 
 def compiled() -> Callable[..., Array] | None:
-    """Forces of pistons and gas in loops that numba compiles; None without numba."""
+    """Return the forces of pistons and gas in loops that numba compiles; None without numba."""
     if find_spec("numba") is None:
         return None
 
@@ -99,7 +99,7 @@ def compiled() -> Callable[..., Array] | None:
 
 
 def by_numba(wrench: Callable[..., Array], plain: PlainEngine, ratio: float, speed: float) -> Array:
-    """Mount forces from compiled loops, with the rotors of plain NumPy."""
+    """Return the mount forces from compiled loops, with the rotors of plain NumPy."""
     g = plain.gas
     gas = (False, 2.0, *[1.0] * 6)
     if g is not None:
@@ -110,18 +110,18 @@ def by_numba(wrench: Callable[..., Array], plain: PlainEngine, ratio: float, spe
 
 
 def own_forces(engine: Engine, point: OperatingPoint) -> Array:
-    """Mount forces by this package."""
+    """Return the mount forces by this package."""
     return rigid_mounting(engine.mounts).forces(shaking_loads(engine, point)).sample(SAMPLES)
 
 
 def with_rods(engine: Engine, ratio: float) -> Engine:
-    """The engine with rods of another length."""
+    """Return the engine with rods of another length."""
     parts = tuple(replace(part, rod_length=part.crank_radius / ratio) for part in engine.slider_cranks)
     return replace(engine, slider_cranks=parts)
 
 
 def force_times(engine: Engine, point: OperatingPoint) -> dict[str, float]:
-    """Milliseconds of the forces over the cycle, by what computes them."""
+    """Return the milliseconds of the forces over the cycle, by what computes them."""
     plain, loops = plain_engine(engine, point, SAMPLES), compiled()
     ratio, speed = engine.slider_cranks[0].rod_ratio, point.speed
     package = own_forces(engine, point)
@@ -142,7 +142,7 @@ def force_times(engine: Engine, point: OperatingPoint) -> dict[str, float]:
 
 
 def design_times() -> dict[str, float]:
-    """Microseconds of a design, by what evaluates it."""
+    """Return the microseconds of a design, by what evaluates it."""
     problem, random = laufruhe.load(PROBLEM), np.random.default_rng(1)
     designs = {d.name: random.uniform(d.lower, d.upper, DESIGNS) for d in problem.decisions}
     affine = AffineModel(problem).at(SAMPLES // 4)
@@ -168,7 +168,7 @@ def design_times() -> dict[str, float]:
 
 
 def by_cvxpy(affine: AffineProblem) -> float:
-    """Optimum of the rows by cvxpy and Clarabel [N]."""
+    """Return the optimum of the rows by cvxpy and Clarabel [N]."""
     x = cp.Variable(affine.size)
 
     def value(norm: object) -> cp.Expression:
@@ -183,7 +183,7 @@ def by_cvxpy(affine: AffineProblem) -> float:
 
 
 def by_scipy(affine: AffineProblem) -> float:
-    """Optimum of the rows by SciPy's SLSQP with exact gradients [N]."""
+    """Return the optimum of the rows by SciPy's SLSQP with exact gradients [N]."""
     norm, scales = affine.terms[0][1], affine.scales
 
     def objective(u: Array) -> tuple[float, Array]:
@@ -200,7 +200,7 @@ def by_scipy(affine: AffineProblem) -> float:
 
 
 def optimum_times() -> list[Answer]:
-    """Milliseconds, value and proof of the optimum, by what finds it."""
+    """Return the milliseconds, value and proof of the optimum, by what finds it."""
     problem = laufruhe.load(PROBLEM)
     affine = AffineModel(problem).at(ANGLES)
     result = laufruhe.solve(problem)
@@ -215,7 +215,7 @@ def optimum_times() -> list[Answer]:
 
 
 def crank_times() -> list[Answer]:
-    """Milliseconds, value and proof of the crank with the least rocking couple of orders 1 and 2, by what finds it."""
+    """Return milliseconds, value and proof of the crank with the least rocking couple of orders 1 and 2, by method."""
     tables = two_stroke_star(THROWS)
     engine, alpha = tables["engine"], math.tau * np.arange(256) / 256
     position = np.cos(alpha) + np.sqrt(engine["rod_ratio"] ** -2 - np.sin(alpha) ** 2)

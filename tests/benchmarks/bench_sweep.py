@@ -36,14 +36,14 @@ STUDIED, STUDY_POINTS = ("tractor-single", "tractor-four-lanchester-and-moment",
 
 
 def timed(run: Callable[[], list[float]]) -> tuple[float, np.ndarray]:
-    """Seconds of processor time, which a busy machine disturbs less, and objectives."""
+    """Return the seconds of processor time, which a busy machine disturbs less, and objectives."""
     start = time.process_time()
     values = run()
     return time.process_time() - start, np.array(values)
 
 
 def general(affines: list[AffineProblem], evolve: bool) -> list[float]:
-    """Optima of the sampled objective by a general-purpose optimiser; decisions lie in discs."""
+    """Return the optima of the sampled objective by a general-purpose optimiser; decisions lie in discs."""
     values = []
     for affine in affines:
         scales, width = affine.scales, affine.size
@@ -67,13 +67,13 @@ def general(affines: list[AffineProblem], evolve: bool) -> list[float]:
 
 
 def over_square(affine: AffineProblem, speed: float) -> AffineProblem:
-    """Forces over speed squared, so that slopes stay over a sweep of the speed."""
+    """Return the forces over speed squared, so that slopes stay over a sweep of the speed."""
     terms = ((w, replace(n, constant=n.constant / speed**2, slope=n.slope / speed**2)) for w, n in affine.terms)
     return replace(affine, terms=tuple(terms))
 
 
 def study_rows() -> list[str]:
-    """Cost of a point of a study, everything about it included, beside a bare re-solve of its program."""
+    """Return the cost of a point of a study, compared with a bare solve of its program."""
     rows = []
     for name in STUDIED:
         problem = load(ROOT / "problems" / f"{name}.toml")
@@ -95,7 +95,7 @@ def study_rows() -> list[str]:
 
 
 def studied(name: str) -> list[float]:
-    """A study over speed on one core, from its file to its dataset."""
+    """Return the seconds of a study over speed on one core, from its file to its dataset."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
         path.write_text(

@@ -31,7 +31,7 @@ RUNS, CYLINDERS = 7, (5, 6, 8, 10, 11, 12)
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """Median processor time of one call."""
+    """Return the median processor time of one call."""
     work()
     times = []
     for _ in range(RUNS):
@@ -42,21 +42,21 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def assembly(chain: Torsion) -> opentorsion.Assembly:
-    """The same chain in openTorsion, which has viscous damping."""
+    """Return the same chain in openTorsion, which has viscous damping."""
     discs = [opentorsion.Disk(k, I=disc.inertia, c=disc.damping) for k, disc in enumerate(chain.discs)]
     shafts = [opentorsion.Shaft(k, k + 1, k=s.stiffness, c=s.damping) for k, s in enumerate(chain.sections)]
     return opentorsion.Assembly(shafts, disk_elements=discs)
 
 
 def viscous(engine: Engine) -> Engine:
-    """An engine whose shafts have viscous damping alone."""
+    """Return an engine whose shafts have viscous damping alone."""
     chain = chain_of(engine)
     sections = tuple(replace(section, loss_factor=0.0, damping=2.0) for section in chain.sections)
     return engine.with_extra(replace(chain, sections=sections))
 
 
 def comparison_rows() -> list[str]:
-    """Natural modes, and the response of every order at one speed, ours and theirs."""
+    """Return the natural modes, and the response of every order at one speed, of both programs."""
     problem = laufruhe.load(PROBLEM)
     engine, point = viscous(problem.engine), problem.points[1]
     torques = throw_torques(engine, point)
@@ -104,7 +104,7 @@ def ranked() -> list[str]:
 
 
 def main() -> None:
-    """The page."""
+    """Write the page."""
     lines = [
         "# Torsional vibration",
         "",

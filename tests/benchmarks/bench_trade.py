@@ -64,7 +64,7 @@ LOWEST, BEYOND = 1e-8, 20.0
 
 
 def draw(trades: list[dict[str, Any]]) -> None:
-    """Error and regret of the usual fidelities: a dot for each problem, a bar in the middle of them."""
+    """Draw error and regret of the usual fidelities: a dot for each problem, a bar at the median."""
     style = importlib.import_module("laufruhe.plots.style")
     drawn = style.page(1, 2, (3.5, 3.6), across=0.3)
     rows = [row for trade in trades for row in trade["rows"]]
@@ -100,7 +100,7 @@ def draw(trades: list[dict[str, Any]]) -> None:
 
 
 def separate_calls() -> list[str]:
-    """Prices of a trade at fidelity `auto`, and the times of public calls."""
+    """Return the prices of a trade at fidelity `auto`, and the times of public calls."""
     lines = [
         "## A trade beside separate calls",
         "",
@@ -276,7 +276,7 @@ def main() -> None:
 
 
 def of_problem(name: str) -> Trade | None:
-    """Trade of a ready problem; none where a flywheel is open, whose cheap model breaks its limits."""
+    """Return the trade of a ready problem; none where a flywheel is open, whose cheap model breaks its limits."""
     problem = laufruhe.load(PROBLEMS / f"{name}.toml")
     if Kind.FLYWHEEL in open_kinds(problem):
         return None

@@ -26,7 +26,7 @@ LINES = 15
 
 
 def run(path: Path, limit: float) -> tuple[int | None, str]:
-    """Exit status of a script, none where it took too long, and the last of what it said."""
+    """Return the exit status of a script, none where it took too long, and the last of what it said."""
     with tempfile.TemporaryFile("w+") as log:
         process = subprocess.Popen(
             [sys.executable, str(path)], cwd=ROOT, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
@@ -42,7 +42,7 @@ def run(path: Path, limit: float) -> tuple[int | None, str]:
 
 
 def _ended(process: subprocess.Popen[bytes]) -> None:
-    """Nothing of it is left, and nothing of what it started in its session."""
+    """End a script and every process that it started in its session."""
     try:
         os.killpg(process.pid, signal.SIGKILL)
     except ProcessLookupError:

@@ -38,13 +38,13 @@ CHOSEN_PICTURES = {
 
 
 def shrunk(source: Path, target: Path) -> None:
-    """The picture in few colours, which is a third of the bytes."""
+    """Reduce a picture to few colours, a third of the bytes."""
     with Image.open(source) as picture:
         picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
 
 
 def live_page() -> None:
-    """The live page of the ready four as a hand moves it: shaft by shaft from the design as given to the optimum."""
+    """Draw the live page of the ready four moved by hand, shaft by shaft from the initial to the final design."""
     with tempfile.TemporaryDirectory() as folder:
         words = [
             sys.executable,
@@ -86,7 +86,7 @@ def _moves(page: Page) -> Iterator[tuple[Image.Image, int]]:
 
 
 def _screenshot(page: Page, design: dict[str, float], name: str | None) -> Image.Image:
-    """The page with a design, the slider that is moved marked as it is under a hand."""
+    """Return a picture of the page with a design, with the moved slider marked."""
     page.evaluate(
         """async ({ design, name }) => {
             const page = await laufruheLive.page;

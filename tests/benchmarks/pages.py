@@ -25,7 +25,7 @@ QUIET = 0.2
 
 
 def spent(work: Callable[[], object]) -> float:
-    """Processor time of one call [s]: what else the machine does counts for little."""
+    """Return the processor time of one call [s]: what else the machine does counts for little."""
     started = time.process_time()
     work()
     return time.process_time() - started
@@ -62,7 +62,7 @@ def _machine() -> str:
 
 
 def publish(path: Path, text: str) -> None:
-    """A page in its place, and on the screen; it says what made it and how busy the machine was."""
+    """Write a page to its place and to the screen, with its script and the load of the machine."""
     text = f"{text.rstrip()}\n\n{_machine()}\n"
     print(text)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -41,7 +41,7 @@ class Answer:
 
 
 def answered(path: Path) -> Answer:
-    """In this process, on one processor."""
+    """Return the answer of this process on one processor."""
     # libraries are loaded before the clock starts, so that versions are compared and not imports
     for library in ("casadi", "clarabel", "cvxpy"):
         import_module(library)
@@ -58,7 +58,7 @@ def answered(path: Path) -> Answer:
 
 
 def answer_of(path: Path) -> Answer:
-    """In a process of its own, that cannot start others on further processors."""
+    """Return the answer of a new process that starts no others."""
     if hasattr(os, "sched_getaffinity"):
         one = {max(os.sched_getaffinity(0))}
         pinned = f"import os; os.sched_setaffinity(0, {one}); "
@@ -73,7 +73,7 @@ def answer_of(path: Path) -> Answer:
 
 
 def ready() -> list[Path]:
-    """Ready problems; a file of a study is none."""
+    """Return the ready problems without files of studies."""
     import tomllib
 
     paths = sorted((ROOT / "problems").glob("*.toml"))
@@ -81,7 +81,7 @@ def ready() -> list[Path]:
 
 
 def saved_answers(path: Path) -> dict[str, Answer]:
-    """A table of an earlier version."""
+    """Return a table of an earlier version."""
     if not path.exists():
         return {}
     types = {field.name: field.type for field in fields(Answer)}
@@ -130,7 +130,7 @@ def page(answers: list[Answer], before: dict[str, Answer]) -> str:
 
 
 def number(value: float) -> str:
-    """Six digits."""
+    """Return a number with six digits."""
     return f"{value:.6g}" if math.isfinite(value) else "-"
 
 

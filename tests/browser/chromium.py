@@ -40,14 +40,14 @@ class Watched:
 
 
 def executable() -> str | None:
-    """Path of the Chromium of this machine."""
+    """Return the path of the Chromium of this machine."""
     found = (shutil.which(name) for name in (os.environ.get(CHOSEN, ""), *NAMES) if name)
     return next((path for path in found if path), None)
 
 
 @contextmanager
 def launched() -> Iterator[Browser]:
-    """A headless Chromium. Playwright downloads none of its own."""
+    """Yield a headless Chromium of this machine."""
     # a sandbox needs a user other than root
     words = ["--disable-gpu", *(["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else [])]
     with sync_playwright() as playwright:
@@ -64,7 +64,7 @@ def foreign(address: str) -> bool:
 
 @contextmanager
 def watched(browser: Browser, **options: object) -> Iterator[Watched]:
-    """A page that reaches files and 127.0.0.1 only."""
+    """Yield a page that reaches files and 127.0.0.1 only."""
     context = browser.new_context(**{"service_workers": "block", "viewport": SCREEN, **options})  # type: ignore[arg-type]
     context.set_default_timeout(PATIENCE)
     seen = Watched(context.new_page())
@@ -99,7 +99,7 @@ def violations(page: Page) -> list[dict[str, object]]:
 
 
 def serious(page: Page) -> list[str]:
-    """Serious and critical findings of axe: rule, what it asks, and the first elements that break it."""
+    """Return the serious and critical findings of axe: rule, what it asks, and the first elements that break it."""
     return [
         f"{found['id']}: {found['help']}; " + ", ".join(str(node["target"]) for node in found["nodes"][:5])  # type: ignore[index]
         for found in violations(page)

@@ -28,7 +28,7 @@ def opened(browser: Browser) -> Iterator[Watched]:
 
 @pytest.fixture
 def reached(opened: Watched) -> Iterator[Watched]:
-    """A page, and the addresses that it asked for and was refused; of a size and colours that no test left behind."""
+    """Yield a page of the usual size and colours, with the addresses that it requested and was refused."""
     opened.page.set_viewport_size(chromium.SCREEN)
     opened.page.emulate_media(media="null", color_scheme="null")
     yield opened
@@ -48,6 +48,6 @@ def still(reached: Watched) -> Iterator[Page]:
 
 @pytest.fixture
 def page(still: Page) -> Page:
-    """An empty page, watched alike."""
+    """Return an empty page, watched alike."""
     still.goto("about:blank")
     return still

@@ -91,13 +91,13 @@ MAKERS: dict[str, Callable[[Path], Path]] = {
 
 
 def made(kind: str) -> Path:
-    """A page of this kind."""
+    """Return a page of this kind."""
     folder = once(f"page-{kind}", lambda folder: (folder / "name").write_text(str(MAKERS[kind](folder))))
     return Path((folder / "name").read_text())
 
 
 def site() -> Path:
-    """Folder of a few pages of the documentation, as the site has them; notebooks and the gallery left out."""
+    """Return folder of a few pages of the documentation, as the site has them; notebooks and the gallery left out."""
 
     def build(folder: Path) -> None:
         source = folder / "source"

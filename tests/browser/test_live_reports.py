@@ -73,7 +73,7 @@ def test_the_page_shows_the_numbers_of_evaluate(name: str, page: Page, tmp_path:
 
 
 def shares(model: object, count: int) -> list[dict[str, float]]:
-    """Places of all sliders between their ends; among the first are the ends themselves."""
+    """Return the places of all sliders between their ends; among the first are the ends themselves."""
     found = []
     for values in designs(model, count):  # type: ignore[arg-type]
         at = {}
@@ -89,7 +89,7 @@ def shares(model: object, count: int) -> list[dict[str, float]]:
 
 @pytest.fixture
 def solved(page: Page) -> Page:
-    """The report of the ready four as the command writes it."""
+    """Return the report of the ready four as the command writes it."""
     page.goto(pages.made("solve").as_uri())
     page.locator("[data-decision]").first.wait_for()
     return page

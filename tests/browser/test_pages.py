@@ -32,7 +32,7 @@ COLOURS = """selector => {
 
 @pytest.fixture(params=pages.MAKERS, scope="module")
 def loaded(request: pytest.FixtureRequest, opened: Watched) -> str:
-    """A page of every kind that commands make."""
+    """Return a page of every kind that commands make."""
     opened.page.goto(pages.made(request.param).as_uri())
     return opened.page.url
 

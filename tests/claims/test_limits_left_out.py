@@ -27,7 +27,7 @@ def problem() -> Problem:
 
 
 def _minimum(problem: Problem, count: int = 400) -> float:
-    """Objective of the best of evenly spaced weights that keep the limits, by the exact model."""
+    """Return the objective of the best of evenly spaced weights that keep the limits, by the exact model."""
     (decision,) = problem.decisions
     values = []
     for value in np.linspace(decision.lower, decision.upper, count):

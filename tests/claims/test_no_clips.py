@@ -39,7 +39,7 @@ ALLOWED = {
 
 
 def names_of(node: ast.expr) -> set[str]:
-    """Names in an expression."""
+    """Return the names in an expression."""
     found = {each.attr for each in ast.walk(node) if isinstance(each, ast.Attribute)}
     return found | {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
 
@@ -55,7 +55,7 @@ def is_value(node: ast.expr) -> bool:
 
 
 def clips(text: str) -> Iterator[str]:
-    """Calls of least and largest in which a bound and something that is known of a design meet."""
+    """Yield calls of min and max that compare a bound with a known value of a design."""
     for node in ast.walk(ast.parse(text)):
         if not isinstance(node, ast.Call) or len(node.args) < 2 or node.keywords:
             continue

@@ -16,7 +16,7 @@ INPUTS = Path(__file__).parent / "inputs"
 
 
 def frequencies(table: dict[str, Any], stiffness: float) -> np.ndarray:
-    """Natural frequencies of the block on upright springs, with the open one at a stiffness [Hz]."""
+    """Return the natural frequencies of the block on upright springs, with the open one at a stiffness [Hz]."""
     centre = np.array([si(x) for x in table["block"]["centre_of_gravity"]])
     (xx, yy, zz), (xy, xz, yz) = ([si(x) for x in table["block"][key]] for key in ("inertia", "inertia_products"))
     mass = np.zeros((6, 6))

@@ -201,7 +201,7 @@ def _with(table: dict[str, Any], k: int, change: dict[str, Any]) -> dict[str, An
 
 
 def _agrees(price: Price, here: float, moved: list[dict[str, Any]], step: float, left: float) -> None:
-    """Values are convex in every edge but an angle: slopes of short steps lie beside the prices, within what bends."""
+    """Check that slopes of short steps lie on both sides of the price of every edge but an angle."""
     relaxed, tightened = (laufruhe.solve(other).objective.value for other in moved)
     falls, rises = (here - relaxed) / step, (tightened - here) / step
     # what a short step bends, and what the proofs leave open

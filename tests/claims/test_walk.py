@@ -43,12 +43,12 @@ BETTER = {
 
 @pytest.fixture(autouse=True)
 def whole_walks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No step is left out for want of time, however slow the machine is."""
+    """Give every walk enough time for all steps, however slow the machine is."""
     monkeypatch.setattr(walk, "SECONDS", 20.0)
 
 
 def marked_optimal(result: Result) -> Result:
-    """The design as given, told as the proven optimum."""
+    """Return the result with the initial design marked as proven optimum."""
     value = result.objective.initial if result.objective is not None else math.nan
     claim = Certificate(Proof.GLOBAL, value * (1.0 - 1e-5), 1e-5, 0.0, "a false bound")
     decisions = tuple(e for d in result.problem.decisions for e in decision_values(d, d.start))
@@ -174,7 +174,7 @@ def resultant(loads: PointLoads) -> Spectrum:
 
 @pytest.fixture
 def transmitted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The resultant of the forces on all mounts, as a channel that says no more of itself than it must."""
+    """Measure the resultant of all mount forces by a channel with the fewest claims."""
     channel = LoadChannel("transmitted force", "N", ON_BLOCK, Needs.MOUNTS, signal=resultant)
     monkeypatch.setitem(CHANNELS._fill(), channel.name, channel)  # type: ignore[attr-defined]
     for norm in NORMS.values():
@@ -206,7 +206,7 @@ class WorstTwentieth(Maximum):
 
 
 def at(problem: Problem, values: dict[str, float]) -> float:
-    """The objective of a design of this file, which keeps its limits."""
+    """Return the objective of a design of this file, which keeps its limits."""
     design = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
     assert design.violation(problem.limits) <= 0.0
     return objective_value(problem, design)

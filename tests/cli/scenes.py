@@ -179,18 +179,18 @@ samples = 360
 
 
 def problem_of(text: str) -> Problem:
-    """The problem that a text describes."""
+    """Return the problem that a text describes."""
     with tempfile.TemporaryDirectory() as folder:
         return loaded(Path(folder), text)
 
 
 @cache
 def solved(text: str) -> Result:
-    """The result of a text, solved once for all tests."""
+    """Return the result of a text, solved once for all tests."""
     return solve(problem_of(text))
 
 
 @cache
 def stated(text: str) -> Result:
-    """The design of a text as given."""
+    """Return the design of a text as given."""
     return evaluate_only(problem_of(text))

@@ -19,7 +19,7 @@ from studies.kills import Log, Whole, stopped
 
 
 def started(folder: Path) -> subprocess.Popen[str]:
-    """The command in a process of its own."""
+    """Start the command in a new process."""
     source = str(Path(laufruhe.__file__).parents[1])
     return subprocess.Popen(
         [sys.executable, "-m", "laufruhe", "solve", "scene.toml", "--out", "out"],

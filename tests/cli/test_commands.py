@@ -38,7 +38,7 @@ def tree(folder: Path) -> set[str]:
 
 
 def refused(result: Result, *words: str) -> None:
-    """Exit status 2, one line, and what is wrong in it."""
+    """Check exit status 2 and one line with these words."""
     assert result.exit_code == 2
     assert result.stdout == ""
     assert len(result.stderr.splitlines()) == 1
@@ -48,7 +48,7 @@ def refused(result: Result, *words: str) -> None:
 
 @pytest.fixture(scope="module")
 def with_pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
-    """A folder in which a problem has been solved and drawn, and what was said."""
+    """Return a folder with a solved and drawn problem, and its result."""
     folder = tmp_path_factory.mktemp("drawn")
     path = written(folder, scenes.TIGHT, "tight")
     with chdir(folder):
@@ -57,7 +57,7 @@ def with_pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Resul
 
 @pytest.fixture
 def drawn(with_pictures: tuple[Path, Result], here: Path) -> Path:
-    """The problem, its results beside it."""
+    """Return the path of the problem with its results beside it."""
     shutil.copytree(with_pictures[0], here, dirs_exist_ok=True)
     return here / "tight.toml"
 

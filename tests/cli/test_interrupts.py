@@ -29,7 +29,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "fork"), reas
 
 
 def started(folder: Path, code: str) -> subprocess.Popen[str]:
-    """A solve that has come as far as its solver."""
+    """Start a solve, and return it when it has reached its solver."""
     path = written(folder, scenes.TIGHT)
     words = [sys.executable, "-c", code + RUN, "solve", str(path), "--no-plots"]
     running = subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -57,7 +57,7 @@ def test_output_that_cannot_be_written_is_an_error(here: Path) -> None:
 
 
 def shell(words: str, here: Path) -> subprocess.CompletedProcess[str]:
-    """A command whose streams a shell closes."""
+    """Run a command whose streams a shell closes."""
     line = f"{shlex.quote(sys.executable)} -m laufruhe {words}"
     return subprocess.run(["sh", "-c", line], cwd=here, capture_output=True, text=True, check=False)
 

@@ -33,7 +33,7 @@ LABEL = re.compile(r"\*\*([A-Z]\d+[a-z]?)\b|\\tag\{([A-Z]\d+[a-z]?)\}")
 
 
 def labels() -> Counter[str]:
-    """Labels, each with the number of pages that define it."""
+    """Return the labels, each with the number of pages that define it."""
     text = [LABEL.findall(page.read_text(encoding="utf-8")) for page in PAGES]
     return Counter(label for page in text for label in {bold or tag for bold, tag in page})
 

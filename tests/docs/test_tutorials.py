@@ -42,7 +42,7 @@ PAGES = [FRONT, *TUTORIALS, *sorted(DOCS.glob("how-to/*.md")), *REFERENCE]
 
 
 def pages(kind: str) -> list[Path]:
-    """Pages with blocks of a kind."""
+    """Return the pages with blocks of a kind."""
     return [page for page in PAGES if blocks(page, kind)]
 
 
@@ -52,7 +52,7 @@ def name_of(page: Path) -> str:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of a user who saved the files of the pages and copied a ready problem."""
+    """Return a folder of a user who saved the files of the pages and copied a ready problem."""
     for page in (FRONT, *TUTORIALS):
         for name, text in FILE.findall(page.read_text(encoding="utf-8")):
             (tmp_path / name).write_text(text, encoding="utf-8")

@@ -76,7 +76,7 @@ def lacking(names: Sequence[str]) -> list[tuple[Tables, str]]:
 
 @pytest.fixture(scope="module")
 def answers() -> Iterator[Callable[[Sequence[str]], Path]]:
-    """Folder with the answers of commands that see the package without some extensions."""
+    """Yield the folder with the answers of commands that see the package without some extensions."""
     script = str(Path(__file__).with_name("forked_commands.py"))
     streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen([sys.executable, script], text=True, **streams) as server:

@@ -62,7 +62,7 @@ Path = tuple[str | int, ...]
 
 
 def damaged_text(text: str, rng: random.Random) -> bytes:
-    """The text with something cut, added, doubled, overwritten, or nested without end."""
+    """Return the text with something cut, added, doubled, overwritten, or nested without end."""
     data = text.encode()
     kind = rng.randrange(9)
     a, b = sorted(rng.randrange(len(data)) for _ in range(2))
@@ -90,7 +90,7 @@ def damaged_text(text: str, rng: random.Random) -> bytes:
 
 
 def damaged_rows(text: str, rng: random.Random) -> bytes:
-    """A trace with cells that are no numbers, rows out of order, or the damage of any text."""
+    """Return a trace with cells that are no numbers, rows out of order, or the damage of any text."""
     if rng.random() < 0.5:
         return damaged_text(text, rng)
     rows = [row.split(",") for row in text.splitlines()]
@@ -103,7 +103,7 @@ def damaged_rows(text: str, rng: random.Random) -> bytes:
 
 
 def damaged_tables(tables: dict[str, Any], rng: random.Random) -> dict[str, Any]:
-    """A copy of the tables in which one to three things are wrong."""
+    """Return a copy of the tables in which one to three things are wrong."""
     out = copy.deepcopy(tables)
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         paths = list(_paths(out))
@@ -146,7 +146,7 @@ def _misspell(tables: Any, path: Path, rng: random.Random) -> None:
 
 
 def _duplicate(tables: Any, path: Path, rng: random.Random) -> None:
-    """An entry of a list once more, or very often."""
+    """Insert an entry of a list once more, or very often."""
     parent, key = _parent(tables, path), path[-1]
     if isinstance(parent, list):
         again = [copy.deepcopy(parent[int(key)]) for _ in range(rng.choice((1, 1, 1, 3, 300)))]
@@ -164,7 +164,7 @@ def _nest(tables: Any, path: Path, rng: random.Random) -> None:
 
 
 def _swap(tables: Any, path: Path, rng: random.Random) -> None:
-    """Two values in each other's place."""
+    """Swap two values."""
     other = rng.choice(_paths(tables))
     if path[: len(other)] == other or other[: len(path)] == path:
         return
@@ -184,7 +184,7 @@ def _wrap(tables: Any, path: Path, rng: random.Random) -> None:
 
 
 def _scale(tables: Any, path: Path, rng: random.Random) -> None:
-    """The same number with another size or sign."""
+    """Change the size or sign of a number."""
     parent, key = _parent(tables, path), path[-1]
     value, factor = parent[key], rng.choice((-1.0, 0.0, 1e-12, 1e-3, 10.0, 1e3, 1e12, 1e200))
     if isinstance(value, str) and value.split(" ")[0].replace(".", "").lstrip("-").isdigit():
@@ -202,7 +202,7 @@ _DAMAGES: tuple[Callable[[Any, Path, random.Random], None], ...] = (
 
 
 def as_toml(tables: dict[str, Any]) -> str:
-    """Tables as TOML text, every table but the outermost inline."""
+    """Return the tables as TOML text, every table but the outermost inline."""
     return "".join(f"{json.dumps(key)} = {_inline(value)}\n" for key, value in tables.items())
 
 

@@ -63,7 +63,7 @@ class _Hang(BaseException):
 
 @cache
 def sources() -> dict[str, list[str]]:
-    """Texts of all ready problems and studies, by kind."""
+    """Return the texts of all ready problems and studies, by kind."""
     found: dict[str, list[str]] = {"problem": [scenes.PARTS, scenes.IMPOSSIBLE], "study": []}
     for path in sorted(PROBLEMS.glob("*.toml")):
         text = path.read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def sources() -> dict[str, list[str]]:
 
 
 def damaged(seed: int) -> tuple[str, bytes]:
-    """The kind of file that a seed damages, and what it makes of it."""
+    """Return the kind of file that a seed damages, and the damaged content."""
     rng = random.Random(seed)
     kind = rng.choices(("problem", "study", "trace"), (70, 20, 10))[0]
     if kind == "trace":
@@ -87,7 +87,7 @@ def damaged(seed: int) -> tuple[str, bytes]:
 
 @contextlib.contextmanager
 def _deep_tables() -> Iterator[None]:
-    """Room for tables nested several times over; commands run with what Python has."""
+    """Allow tables nested several times deeper than Python's default."""
     usual = sys.getrecursionlimit()
     sys.setrecursionlimit(20 * usual)
     try:

@@ -31,7 +31,7 @@ sweep = [{ quantity = "engine.rod_ratio", values = [0.2, 0.3] }]
 
 
 def refused(path: Path, *words: str, verb: str = "check") -> str:
-    """Exit status 2, and one line that a screen can show, with these words in it."""
+    """Check exit status 2 and one printable line with these words, and return it."""
     answer = CliRunner().invoke(app, [verb, str(path)])
     assert answer.exception is None or isinstance(answer.exception, SystemExit), answer.exception
     assert answer.exit_code == BAD_INPUT

@@ -18,7 +18,7 @@ SUBJECTS = (channels.MOUNT_FORCE, channels.SHAKING_FORCE, channels.ROLL_MOMENT, 
 
 
 def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
-    """An engine of one to eight cylinders, its mounts and one or two operating points, on one measure."""
+    """Return an engine of one to eight cylinders, its mounts and one or two operating points, on one measure."""
     count, cycle = rng.randint(1, 8), rng.choice(list(Cycle))
     radius = rng.uniform(0.02, 0.1)
     ratio = rng.uniform(0.05, 0.5)
@@ -53,7 +53,7 @@ def random_problem(rng: random.Random, gas: bool | None = None) -> Problem:
 
 
 def random_elastic_problem(rng: random.Random, gas: bool | None = None) -> Problem:
-    """The same on elastic mounts: some stiff, some soft, with loss or damping, some symmetric in the plane y = 0."""
+    """Return the random problem on elastic mounts: stiff, soft, with loss or damping, some symmetric."""
     problem = random_problem(rng, gas)
     engine = problem.engine
     mass, symmetric = rng.uniform(50.0, 600.0), rng.random() < 0.4
@@ -94,7 +94,7 @@ def _gas(rng: random.Random, with_gas: bool | None) -> GasModel | None:
 
 
 def finer(problem: Problem, samples: int) -> Problem:
-    """The same at a fidelity above any that the project offers of itself."""
+    """Return the problem at a fidelity above any that the package chooses."""
     return replace(problem, fidelity=replace(problem.fidelity, kinematics="exact", samples=samples, orders=None,
                                              rod="rigid", gas=True, gas_samples=None, mounts="frequency", modes=None,
                                              tolerance=None))  # fmt: skip

@@ -28,7 +28,7 @@ from problem_files import ELASTIC, PROBLEMS, written
 
 
 def held(path: Path) -> Problem:
-    """A ready problem with its mounts as given, and a load to judge."""
+    """Return a ready problem on its given mounts, with a load to judge."""
     problem = load(path).balance
     objective = problem.objective or load(PROBLEMS / "tractor-four-elastic.toml").balance.objective
     return replace(problem, limits=(), objective=objective)
@@ -53,7 +53,7 @@ def test_modes_that_nothing_excites_answer_nothing(path: Path) -> None:
 
 
 def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
-    """Mount forces of the equations that time integrates, without bump stops (E25, E26)."""
+    """Return the mount forces of the equations that time integrates, without bump stops (E25, E26)."""
     model = time_model(mounting)
     omega = wrench.orders[:, None, None] * speed
     impedance = model.stiffness + 1j * omega * model.damping - omega**2 * np.eye(model.size)
@@ -170,7 +170,7 @@ def test_modes_are_numbers_of_the_table(modes: str, tmp_path: Path) -> None:
 
 
 def _elastic_text() -> str:
-    """A ready problem whose mounts are given numbers."""
+    """Return the text of a ready problem whose mounts are given numbers."""
     import re
 
     text = (PROBLEMS / "study-soft-mounts.toml").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ SHARES = [(0, 30), (30, 20), *((first, 1000) for first in range(0, 10_000, 1000)
 
 
 def _sampling_errors(seed: int) -> tuple[float, float]:
-    """True and stated error of samples with all physics."""
+    """Return the true and stated error of samples with all physics."""
     rng = random.Random(seed)
     problem = random_problem(rng)
     own = replace(problem, fidelity=Fidelity(samples=rng.choice([48, 96, 360, 1440])))

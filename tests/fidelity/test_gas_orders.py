@@ -29,7 +29,7 @@ EVERY = 10_000
 
 
 def _scene(make, seed: int) -> Problem:
-    """Rigid or elastic, even or uneven throws, rows and vees, two- and four-stroke, always with gas."""
+    """Return a random problem with gas: rigid or elastic mounts, even or uneven throws, rows and vees."""
     return make(random.Random(40_000 + seed), gas=True)
 
 
@@ -70,7 +70,7 @@ def test_uneven_throws_are_loaded_by_the_kept_orders(monkeypatch: pytest.MonkeyP
 
 
 def _roll_of_star(fidelity: Fidelity) -> dict[float, complex]:
-    """Roll moment of a star by order, as a smooth program has it."""
+    """Return the roll moment of a star by order, as a smooth program has it."""
     problem = load(PROBLEMS / "inline-five-uneven-gas.toml").at(fidelity)
     assert problem.phasing is not None
     throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))

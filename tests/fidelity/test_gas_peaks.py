@@ -82,7 +82,7 @@ def _torque(gas: GasModel | None, part: SliderCrank, angles: Any, cycle: Any) ->
 
 
 def _bends(gas: GasModel | None, part: SliderCrank, whole: float) -> Any:
-    """Many angles, and the cut-off by halving: where the pressure leaves its peak, not where the model says so."""
+    """Return many angles with the end of the peak pressure, found by halving without the model."""
     if isinstance(gas, PressureTrace):
         return np.array(gas.angles)
     fine = np.linspace(0.0, whole, 2001)

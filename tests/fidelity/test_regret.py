@@ -44,7 +44,7 @@ FIDELITIES = (
 
 
 def _scene(rng: random.Random) -> Problem:
-    """A random engine with an open unbalance on one or two shafts."""
+    """Return a random engine with an open unbalance on one or two shafts."""
     problem = random_problem(rng)
     size = 2.0 * sum(part.reciprocating_mass * part.crank_radius for part in problem.engine.slider_cranks)
     rotors, decisions = list(problem.engine.rotors), []

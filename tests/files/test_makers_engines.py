@@ -28,7 +28,7 @@ POINT = [{"speed": "3000 rpm"}]
 
 
 def typed(key: str, **changes: Any) -> Problem:
-    """The engine of the table; a key changed to None is left out."""
+    """Return the engine of the table; a key changed to None is left out."""
     engine = {**SIZES, "firing_order": ENGINES[key]["order"], **ENGINES[key]["typed"], **changes}
     if engine["layout"] == "parts":
         places = zip(ENGINES[key]["banks"], ENGINES[key]["pins"], strict=True)
@@ -49,13 +49,13 @@ def intervals_of(engine: Printed) -> list[float]:
 
 
 def fires_at(engine: Printed) -> dict[int, float]:
-    """Crank angles after the first firing, by printed number."""
+    """Return the crank angles after the first firing, by printed number."""
     intervals = intervals_of(engine)
     return {number: sum(intervals[:place]) for place, number in enumerate(engine["order"])}
 
 
 def off_centre(engine: Printed) -> dict[int, float]:
-    """Angles between each firing and the nearest dead centre of its cylinder."""
+    """Return the angles between each firing and the nearest dead centre of its cylinder."""
     centres = [bank - pin for bank, pin in zip(engine["banks"], engine["pins"], strict=True)]
     first = centres[engine["order"][0] - 1]
     return {n: abs(math.remainder(centres[n - 1] - first - at, 360.0)) for n, at in fires_at(engine).items()}

@@ -64,7 +64,7 @@ def loaded(engine: Table, **tables: Any) -> Problem:
 
 
 def renumbered(engine: Table, numbers: list[int]) -> Table:
-    """The same engine: cylinder k of the layout has numbers[k - 1]; throws go by their first number."""
+    """Return the same engine with cylinder k of the layout numbered numbers[k - 1]."""
     changed: Table = {**engine, "numbering": numbers}
     if order := engine.get("firing_order"):
         new = [numbers[k - 1] for k in order]

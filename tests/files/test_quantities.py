@@ -17,7 +17,7 @@ SINGLE = Path(__file__).parents[2] / "problems" / "single-stroke-offset.toml"
 
 
 def tables(ratio: Any, **engine: Any) -> dict[str, Any]:
-    """The tractor single with a ratio of stroke to bore, its stroke 120 mm and its bore 100 mm."""
+    """Return the tractor single with a ratio of stroke to bore, its stroke 120 mm and its bore 100 mm."""
     data = tomllib.loads(SINGLE.read_text(encoding="utf-8"))
     data["engine"] |= {"stroke": "120 mm", "offset": "0 mm", **engine}
     data["quantities"] = {"stroke_over_bore": ratio}

@@ -58,7 +58,7 @@ speed = "3000 rpm"
 
 
 def complaint_about(path: Path) -> str:
-    """The one line that a file is refused with, the file's name taken off."""
+    """Return the line that refuses a file, without its name."""
     with pytest.raises(InputError) as caught:
         load(path)
     (line,) = str(caught.value).splitlines()

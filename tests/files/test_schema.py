@@ -36,7 +36,7 @@ NUMBERS = ("m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "N s/m", "Hz", 
 
 
 def problem_pages() -> list[str]:
-    """Pages that explain the tables of problem files: the overview, and those that its table names."""
+    """Return the pages that explain the tables of problem files: the overview, and those that its table names."""
     overview = (REFERENCE / "problem-files.md").read_text(encoding="utf-8")
     return ["problem-files.md", *dict.fromkeys(re.findall(r"^\| `.*\]\(([\w-]+\.md)\) \|$", overview, re.MULTILINE))]
 

@@ -27,7 +27,7 @@ CORNERS = {"crankshaft": 0j, "left crankshaft": HEIGHT + 0.5j * SIDE, "right cra
 
 
 def masses_of(engine: Engine) -> list[mm.Mass]:
-    """Pistons on their ways: the axis of each is the side of the triangle, whatever the engine says of banks."""
+    """Return the masses of pistons whose axes are the sides of the triangle."""
     found = []
     for part in engine.slider_cranks:
         pin = mm.crank_pin(RADIUS, part.throw, part.shaft.ratio, CORNERS[part.shaft.name])
@@ -39,7 +39,7 @@ def masses_of(engine: Engine) -> list[mm.Mass]:
 
 
 def leads(engine: Engine) -> list[float]:
-    """Crank angle between the inner dead centres of the two pistons of every bank, from where the pistons are [deg]."""
+    """Return the crank angle between inner dead centres of the two pistons of every bank, from their places [deg]."""
     found = []
     for k, part in enumerate(engine.slider_cranks[:3]):
         other = engine.slider_cranks[k + 3]

@@ -96,21 +96,21 @@ by_fidelity = pytest.mark.parametrize("fidelity", [EXACT, TWO_ORDER], ids=lambda
 
 
 def _loads(row: Row, order: int, fidelity: Fidelity = EXACT, offset: float = 0.0) -> NDArray[np.complex128]:
-    """Wrench of the reciprocating masses alone, for one order."""
+    """Return the wrench of the reciprocating masses alone, for one order."""
     engine = row.engine(offset)
     total = shaking_loads(engine, OperatingPoint("speed", SPEED), fidelity).at(order)
     return np.asarray(total - rotating_loads(engine, SPEED).at(order))
 
 
 def _cylinder_force(order: int, fidelity: Fidelity) -> float:
-    """Amplitude of one cylinder's force, F_I or F_II; of the exact mechanism or to first order in lambda."""
+    """Return the amplitude of one cylinder's force, F_I or F_II; of the exact mechanism or to first order in lambda."""
     truncated = {1: 1.0, 2: RADIUS / LENGTH}
     exact = abs(piston_acceleration_orders(RADIUS / LENGTH, 0.0, order)[order])
     return UNIT_FORCE * (exact if fidelity is EXACT else truncated[order])
 
 
 def _extremes(vector: NDArray[np.complex128]) -> tuple[float, float]:
-    """Largest and smallest length of Re c e^{ix} over a turn of x: the half axes of its ellipse."""
+    """Return the largest and smallest length of Re c e^{ix} over a turn of x: the half axes of its ellipse."""
     largest, smallest = np.linalg.svd(np.array([vector.real, vector.imag]), compute_uv=False)
     return float(largest), float(smallest)
 

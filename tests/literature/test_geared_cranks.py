@@ -23,7 +23,7 @@ RADIUS, ROD, PISTON, PIN, SPEED = 0.04, 0.04 / 0.2857, 0.6, 0.8, 100.0 * np.pi
 
 
 def twin(factor: float) -> list[mm.Mass]:
-    """Fig. 4.1 as masses on their ways."""
+    """Return the masses of Fig. 4.1 on their paths."""
     found = []
     for ratio, centre in ((1.0, 0.06j), (-1.0, -0.06j)):
         pin = mm.crank_pin(RADIUS, 0.0, ratio, centre)
@@ -115,14 +115,14 @@ O_RADIUS, O_ROD, O_PISTON, O_APART, O_SPEED = 0.05, 0.2, 2.0, 0.64, 2000.0 * np.
 
 
 def facing(lead: float, ratio: float = -1.0) -> tuple[mm.Complex, mm.Complex]:
-    """Ways of the lower and the upper piston of a cylinder, the upper first at its dead centre by a lead [rad]."""
+    """Return the paths of the lower and the upper piston of a cylinder, the upper one with a lead [rad]."""
     lower = mm.piston(mm.crank_pin(O_RADIUS), O_ROD, 0.0)
     pin = mm.crank_pin(O_RADIUS, np.pi + ratio * lead, ratio, O_APART)
     return lower, mm.piston(pin, O_ROD, np.pi, O_APART)
 
 
 def charge(volume: np.ndarray, steps: int) -> np.ndarray:
-    """Mixed cycle in a volume over a turn from its least, its cut-off found by halving what is missing [Pa]."""
+    """Return the pressure of the mixed cycle over a turn from the least volume, with its cut-off by halving [Pa]."""
     swept = volume.max() - volume.min()
     clearance = swept / 15.0
     whole = volume - volume.min() + clearance

@@ -51,13 +51,13 @@ def _loads(engine: Engine, fidelity: Fidelity = TWO_ORDER) -> Spectrum:
 
 
 def _star(throws: tuple[float, ...]) -> complex:
-    """Couple star of an inline engine, sum of x_k e^{i theta_k}, in distances of cylinders."""
+    """Return the couple star of an inline engine, sum of x_k e^{i theta_k}, in distances of cylinders."""
     places = stations(len(throws), 1.0)
     return sum(x * cmath.exp(1j * theta) for x, theta in zip(places, throws, strict=True))
 
 
 def _couple(name: str, shaft: Shaft, apart: float, unbalance: complex, role: Role) -> tuple[Rotor, Rotor]:
-    """Two opposite unbalances on a shaft, a distance apart, about the middle of the engine."""
+    """Return the two opposite unbalances on a shaft, a distance apart, about the middle of the engine."""
     return (
         Rotor(f"{name} front", 0.5 * apart, unbalance, shaft, role),
         Rotor(f"{name} rear", -0.5 * apart, -unbalance, shaft, role),
@@ -179,8 +179,10 @@ class TestFourCylinder:
         return tuple(Rotor(f"force {s.name}", 0.0, -unbalance, s, Role.BALANCER) for s in shafts)
 
     def moment_pair(self, unbalance: float, apart: float) -> tuple[Rotor, Rotor]:
-        """Both with the crank, side by side, opposite to each other, and along their distance at phi = 0: the engine's
-        roll moment goes with sin 2 phi."""
+        """Return two opposite unbalances that turn with the crank side by side, along their distance at phi = 0.
+
+        The engine's roll moment goes with sin 2 phi.
+        """
         left, right = Shaft("left", 2.0, y=0.5 * apart, z=0.03), Shaft("right", 2.0, y=-0.5 * apart, z=0.03)
         return (
             Rotor("moment left", 0.26, -1j * unbalance, left, Role.BALANCER),
@@ -253,7 +255,7 @@ class TestFourCylinder:
 
 
 def _turning_parts(wrench: NDArray[np.complex128]) -> tuple[float, float]:
-    """Amplitudes of the parts of a force that turn with and against the crank (R_Ir and R_Il of Fig. 29)."""
+    """Return the amplitudes of the parts of a force that turn with and against the crank (R_Ir and R_Il of Fig. 29)."""
     return abs(wrench[2] + 1j * wrench[1]) / 2, abs(wrench[2] - 1j * wrench[1]) / 2
 
 

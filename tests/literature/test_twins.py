@@ -30,7 +30,7 @@ def _solved(name: str) -> Result:
 
 
 def _shares(result: Result, order: int, columns: tuple[int, int]) -> tuple[float, float]:
-    """Sizes of the forward and the backward part of an order, in forces of one piston's first order."""
+    """Return the sizes of the forward and the backward part of an order, in forces of one piston's first order."""
     part, speed = result.final.engine.slider_cranks[0], result.problem.points[0].speed
     unit = part.reciprocating_mass * part.crank_radius * speed**2
     values = result.final.loads[0].wrench.at(order)
@@ -39,7 +39,7 @@ def _shares(result: Result, order: int, columns: tuple[int, int]) -> tuple[float
 
 
 def _masses(result: Result, phi: NDArray[np.float64]) -> list[tuple[float, float, ComplexArray]]:
-    """Mass, place along the crank and place across it of all that moves, by plain geometry."""
+    """Return the mass, place along the crank and place across it of all that moves, by plain geometry."""
     found = []
     for part in result.final.engine.slider_cranks:
         alpha = phi + part.throw - part.bank

@@ -50,7 +50,7 @@ QUANTITIES = (
 
 @lru_cache(maxsize=2)
 def scene(cylinders: int) -> Problem:
-    """Decisions of every kind, started off zero, on three operating points of different weight and load."""
+    """Return the decisions of every kind, started off zero, on three operating points of different weight and load."""
     rotors = [
         shaft_rotor("left", 2, 0.25, 0.1, -0.1),
         shaft_rotor("right", -2, 0.2, -0.1, -0.1),
@@ -110,7 +110,7 @@ COLUMNS = st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5).map(np.array)
 
 
 def steps_of(rows: np.ndarray, grid: Grid) -> np.ndarray:
-    """Rows without those at bends, of which a cycle has more than a period."""
+    """Return the rows without those at bends, of which a cycle has more than a period."""
     blocks = rows.reshape(-1, grid.steps, rows.shape[-1])
     return blocks[:, : grid.steps - grid.kinks].reshape(-1, rows.shape[-1])
 
@@ -171,7 +171,7 @@ def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) 
 
 @lru_cache(maxsize=1)
 def inside() -> tuple[Problem, AffineModel, AffineProblem]:
-    """Five bearings between and beside the throws; its model, and that at 96 steps."""
+    """Return the five bearings between and beside the throws; its model, and that at 96 steps."""
     whole = scene(4)
     bearings = tuple(Bearing(str(k), 0.25 - 0.12 * k, 0.06, 0.025, 0.01) for k in range(5))
     parts = tuple(replace(part, big_end=(0.05, 0.03)) for part in whole.engine.slider_cranks)

@@ -45,7 +45,7 @@ MECHANISM = mechanism_of(0.06, 0.06 / 0.26, 1.25, rotating_mass=0.8, rod_rotatin
 
 
 def degrees(angles: tuple[float, ...], whole: float = 360.0) -> list[float]:
-    """Within one turn, with a whole turn counted as none."""
+    """Return the angles within one turn, with a whole turn as zero [deg]."""
     return [round(math.degrees(angle) % whole, 9) % whole for angle in angles]
 
 

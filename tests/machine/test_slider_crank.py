@@ -44,7 +44,7 @@ class TestRod:
 
 
 def stroke_by_search(part: SliderCrank) -> float:
-    """Highest less lowest piston, on the triangle itself: dead centres are where crank and rod are in line."""
+    """Return the stroke between dead centres, where crank and rod are in line, on the triangle itself."""
     r, l, e = part.crank_radius, part.rod_length, part.offset
     best = math.asin(e / (l + r)), math.pi + math.asin(e / (l - r))
     alpha = np.concatenate([np.linspace(0, math.tau, 721), best])

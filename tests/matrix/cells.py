@@ -28,7 +28,7 @@ class Open:
     unit: str = ""
 
     def text(self, values: Mapping[str, float] | None) -> str:
-        """Bounds, or the value decided [SI]; angles are degrees in files."""
+        """Return the bounds, or the value decided [SI]; angles are degrees in files."""
         if values is None:
             return f"{{ between = [{self._number(self.lower)}, {self._number(self.upper)}] }}"
         return self._number(math.degrees(values[self.name]) if self.unit == "deg" else values[self.name])
@@ -54,7 +54,7 @@ class OpenThrows:
 
 
 def written(document: Document, values: Mapping[str, float] | None = None) -> str:
-    """The text of a file, its open numbers open or at values."""
+    """Return the text of a file, its open numbers open or at values."""
 
     def text(value: Any) -> str:
         if isinstance(value, (Open, OpenThrows)):
@@ -132,7 +132,7 @@ def _steam(rng: Generator) -> Document:
 
 
 def _chambers(rng: Generator) -> Document:
-    """Both sides of a piston, and a pump on the rod of the first cylinder."""
+    """Return chambers on both sides of a piston, and a pump on the rod of the first cylinder."""
     steam = {"admission": "9 bar", "cut_off": float(rng.uniform(0.2, 0.6)), "back_pressure": "1.2 bar"}
     steam |= {"release": 0.93, "compression": 0.15, "lead": 0.01, "clearance": 0.06}
     sides = [{"end": "head", "bore": "80 mm"}, {"end": "crank", "bore": "80 mm", "rod": "18 mm"}]
@@ -311,7 +311,7 @@ def cells(seed: int = 0) -> list[Cell]:
 
 
 def document_of(cell: Cell) -> Document:
-    """The problem of a cell."""
+    """Return the problem of a cell."""
     rng = np.random.default_rng([cell.seed, *map(ord, str(cell))])
     engine = {
         "cycle": str(rng.choice(["two-stroke", "four-stroke"])), "bore": "80 mm", "stroke": "84 mm", "rod_ratio": 0.27,
@@ -351,7 +351,7 @@ def document_of(cell: Cell) -> Document:
 
 
 def _channel(measure: str) -> Channel:
-    """The channel of a measure's name."""
+    """Return the channel of a measure's name."""
     return next(channel for channel in CHANNELS.values() if measure.endswith(channel.name))
 
 
@@ -403,7 +403,7 @@ def _narrowed(measure: str, document: Document, rng: Generator) -> Document:
 
 
 def _add_limit(document: Document, rng: Generator) -> None:
-    """On another measure, somewhere near what is usual for it."""
+    """Add a limit on another measure, near its usual value."""
     has_mounts, elastic = "mounts" in document, "block" in document
     usual: list[tuple[str, tuple[float, float], str, str]] = [
         ("rms shaking force", (200, 6000), "N", "max"), ("maximum rocking couple", (10, 600), "N m", "max"),

@@ -50,7 +50,7 @@ class Verdict:
 
 
 def evaluate_design(cell: Any, folder: Path) -> Verdict:
-    """The verdict on a cell."""
+    """Return the verdict on a cell."""
     document = document_of(cell)
     path = folder / "problem.toml"
     path.write_text(written(document), encoding="utf-8")
@@ -154,13 +154,13 @@ def _values(result: Result) -> dict[str, float]:
 
 
 def _order(result: Result) -> list[int] | None:
-    """Firing order decided with a star."""
+    """Return the firing order decided with a star."""
     ranked = result.phasing.ranking if result.phasing is not None else ()
     return list(ranked[0].firing_orders[0].order) if ranked and ranked[0].firing_orders else None
 
 
 def _loaded(document: Document, values: Mapping[str, float], order: list[int] | None, folder: Path) -> Problem:
-    """The problem with its open numbers at values, written and read again; throws without a value follow the order."""
+    """Return the problem with values of open numbers, written and read; throws without a value follow the order."""
     document = {key: own for key, own in document.items() if key != "phasing"}
     if values.get("s built") == 0.0:
         # what is not built weighs nothing and stands nowhere
@@ -212,7 +212,7 @@ def _drawn(document: Document, generator: random.Random) -> dict[str, float]:
 def _other_designs(
     document: Document, problem: Problem, result: Result, folder: Path
 ) -> Iterator[tuple[float, bool]]:  # fmt: skip
-    """Objective of designs as given, drawn and next to the one decided, and whether limits allow them."""
+    """Yield the objectives of the initial, drawn and neighbouring designs, and whether limits allow them."""
     generator, samples = random.Random(problem.title), _fine(result)
     found = evaluate(problem, samples=samples)
     if problem.phasing is None or problem.phasing.throws is not None:
@@ -252,12 +252,12 @@ def _of_star(
 
 
 def _fine(result: Result) -> int:
-    """Angles at which designs are set against each other: a bound holds for the whole cycle."""
+    """Return the number of angles at which designs are compared: a bound holds for the whole cycle."""
     return max(result.final.samples, FINE)
 
 
 def _evaluated(problem: Problem, engine: Engine, samples: int) -> tuple[float, bool]:
-    """Objective of one design, infinite where it has no loads, and whether limits allow it."""
+    """Return the objective of one design, infinite where it has no loads, and whether limits allow it."""
     try:
         evaluation = evaluate(problem, engine, samples)
         return objective_value(problem, evaluation), evaluation.violation(problem.limits) <= STRICTLY

@@ -28,7 +28,7 @@ def _one(cell: Cell) -> tuple[Cell, Verdict, float]:
 
 
 def main() -> int:
-    """Judge them, tell what was found, and keep the files of what is wrong."""
+    """Judge the cells, print the counts, and keep the files of wrong ones."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--share", type=float, default=1.0, help="of all combinations")

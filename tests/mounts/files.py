@@ -57,7 +57,7 @@ max = "40/3 Hz"
 
 
 def problem_of(folder: Path, *parts: str, **changes: str) -> Problem:
-    """A problem from parts of a file; `changes` replaces text in them."""
+    """Return a problem from parts of a file; `changes` replaces text in them."""
     text = "\n".join(parts)
     for old, new in changes.items():
         assert old in text, old

@@ -27,7 +27,7 @@ def powertrain(loss: float = 0.0, damping: float = 0.0, stiffer: float = 1.0, **
 
 
 def wrench(seed: int = 0, orders: int = 4, base: Fraction = Fraction(1, 1)) -> Spectrum:
-    """A load with every component at every order, none at order zero."""
+    """Return a load with every component at every order, none at order zero."""
     generator = np.random.default_rng(seed)
     size = np.array([100.0, 100.0, 300.0, 60.0, 40.0, 40.0])
     values = (generator.normal(size=(orders + 1, 6)) + 1j * generator.normal(size=(orders + 1, 6))) * size
@@ -36,7 +36,7 @@ def wrench(seed: int = 0, orders: int = 4, base: Fraction = Fraction(1, 1)) -> S
 
 
 def random_mounting(seed: int, count: int = 4, loss: float = 0.1, damping: float = 30.0) -> ElasticMounting:
-    """Mounts at random places, turned at random, on a body that can exist."""
+    """Return the mounts at random places, turned at random, on a body that can exist."""
     from laufruhe.numerics.namespaces import NUMBERS
     from laufruhe.physics.rigid_body import turned_axes
 

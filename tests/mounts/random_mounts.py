@@ -163,7 +163,7 @@ class Drawn:
         return lines
 
     def _measure(self, limit: bool) -> list[str]:
-        """A quantity and its keys; which side it is limited on comes last."""
+        """Return a quantity and its keys; which side it is limited on comes last."""
         rng = self.rng
         numbers = ["static sag", "torque-roll residual", "total stiffness", "transmissibility"]
         if self.family == "convex":
@@ -197,7 +197,7 @@ class Drawn:
 
 
 def limits_of(drawn: Drawn, problem: Problem) -> list[str]:
-    """Limits about what the design as given has."""
+    """Return the limits about what the design as given has."""
     evaluation, lines = evaluate(problem), []
     for k, ((name, *keys), room) in enumerate(zip(drawn.limited_quantities, drawn.room, strict=True)):
         probe = load_text(drawn, [*_limit(name, keys, k), 'min = "1 Hz"' if "frequencies" in name else _probe(name)])
@@ -232,7 +232,7 @@ def _probe(name: str) -> str:
 
 
 def load_text(drawn: Drawn, limits: list[str]) -> Problem:
-    """The problem with these limits."""
+    """Return the problem with these limits."""
     path = drawn.folder / "drawn.toml"
     path.write_text(drawn.text(limits))
     return load(path)
@@ -247,7 +247,7 @@ class AttainableLimit:
 
 
 def values_at(problem: Problem, y: np.ndarray) -> list[Value]:
-    """Decisions from numbers between 0 and 1."""
+    """Return the decisions from numbers between 0 and 1."""
     out: list[Value] = []
     numbers = iter(np.clip(y, 0.0, 1.0))
     for decision in problem.decisions:
@@ -262,7 +262,7 @@ def values_at(problem: Problem, y: np.ndarray) -> list[Value]:
 
 
 def searched(problem: Problem, result: Result, seed: int, budget: int = 250) -> AttainableLimit:
-    """Differential evolution, and Nelder and Mead from what was found, by the exact model alone."""
+    """Return the best of differential evolution and of Nelder-Mead from there, by the exact model alone."""
     width = sum(decision.set.width for decision in problem.decisions)
     best = [np.inf, np.inf]
 
@@ -290,7 +290,7 @@ def searched(problem: Problem, result: Result, seed: int, budget: int = 250) -> 
 
 
 def place_of(problem: Problem, result: Result) -> np.ndarray | None:
-    """The design of a result in numbers between 0 and 1."""
+    """Return the design of a result in numbers between 0 and 1."""
     if not result.decisions:
         return None
     return np.array([(d.value - d.lower) / ((d.upper - d.lower) or 1.0) for d in result.decisions])
@@ -328,7 +328,7 @@ def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
 
 
 def drawn_problem(family: str, seed: int, folder: Path) -> Problem:
-    """A random problem with limits about what the design as given has."""
+    """Return a random problem with limits about what the design as given has."""
     drawn = Drawn(family, seed, folder)
     return load_text(drawn, limits_of(drawn, load_text(drawn, [])))
 

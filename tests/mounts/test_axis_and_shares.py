@@ -31,7 +31,7 @@ ANY = (0.0, math.inf)
 
 
 def _given(mounting):
-    """K, M and the turning of one radian about I^-1 e, from their definitions."""
+    """Return K, M and the unit rotation about I^-1 e from their definitions."""
     block = mounting.block
     axis = np.linalg.solve(np.array(block.inertia) - block.turning_inertia * np.diag([1.0, 0.0, 0.0]), [1.0, 0.0, 0.0])
     return mounting.stiffness, block.mass_matrix, np.concatenate([np.zeros(3), axis / np.linalg.norm(axis)])
@@ -63,7 +63,7 @@ def test_a_block_that_turns_about_its_axis_in_a_mode_leaves_nothing():
 
 
 def _joint_least_squares(problem, low, high):
-    """Least |K(x) q - s M q| over x and s in their bounds: one bounded least-squares problem of SciPy."""
+    """Return the least |K(x) q - s M q| over x and s in their bounds: one bounded least-squares problem of SciPy."""
     decisions = problem.decisions
 
     def rows(x):
@@ -156,7 +156,7 @@ def test_a_projection_is_no_longer_than_components_allow():
 
 
 def _share(problem, x):
-    """Shares of motions from SciPy's generalised eigenproblem."""
+    """Return the shares of motions from SciPy's generalised eigenproblem."""
     k, m, _ = _given(mounting_in(problem.design(list(x))))
     shapes = eigh(k, m)[1]
     return shapes * (m @ shapes)

@@ -47,13 +47,13 @@ CUBE = Block(100.0, ((4.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, 0.0, 6.0)))
 
 
 def motion(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
-    """Motion (u, theta) of the centre of gravity, shape (n, 6) [m, rad]."""
+    """Return the motion (u, theta) of the centre of gravity, shape (n, 6) [m, rad]."""
     amplitudes = mounting.responses(wrench.orders * speed, wrench.coefficients)
     return Spectrum(wrench.base, amplitudes @ mounting.modes.shapes.T)
 
 
 def four(loss: float = 0.1, stiffness=(1e5, 1e5, 4e5), block: Block = CUBE, **more):
-    """Four mounts in a plane through the centre of gravity, symmetric both ways."""
+    """Return the four mounts in a plane through the centre of gravity, symmetric both ways."""
     places = [(x, y, 0.0) for x in (0.3, -0.3) for y in (0.2, -0.2)]
     return elastic_mounting(
         block, [Mount(f"m{k}", p, stiffness, loss_factor=loss, **more) for k, p in enumerate(places)]

@@ -66,7 +66,7 @@ def test_a_track_is_soft_at_its_notch_and_stiff_above_it() -> None:
 
 
 def _seven(mounting, omega: float, load: np.ndarray) -> np.ndarray:
-    """Forces on the mounts from M, C and K of block and fluid written out, shape (mounts, 3)."""
+    """Return the forces on the mounts from M, C and K of block and fluid written out, shape (mounts, 3)."""
     block, centre = mounting.block, np.array(mounting.block.centre_of_gravity)
     laws = [(k, law) for k, mount in enumerate(mounting.mounts) for law in mount.dynamic]
     size = 6 + len(laws)

@@ -233,7 +233,7 @@ STOPPED = GAPS["wide"]
 
 @pytest.fixture(scope="module")
 def least_stiff(tmp_path_factory):
-    """Least stiffness that keeps a travel, without bump stops and with them."""
+    """Return the problem of least stiffness that keeps a travel, with and without bump stops."""
     found = {}
     for name, mounts in (("free", MOUNTS), ("stopped", STOPPED)):
         problem = problem_of(tmp_path_factory.mktemp(name), ENGINE, AHEAD, mounts, CASES, SOFT, LIMIT)

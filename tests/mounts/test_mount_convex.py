@@ -50,7 +50,7 @@ def program_of(problem):
 
 
 def least_squares(tmp_path):
-    """Torque-roll residual in box bounds alone: a bounded least-squares problem."""
+    """Return a torque-roll residual in box bounds, a bounded least-squares problem."""
     text = MOUNTS.replace('"120 N/mm", "120 N/mm"', '{ between = ["30 N/mm", "300 N/mm"] }, "120 N/mm"', 1)
     block = BLOCK + 'inertia_products = ["2 kg m^2", "-3 kg m^2", "1 kg m^2"]\n'
     objective = '[objective]\nminimise = "torque-roll residual"\nfrequency = "9 Hz"\n'

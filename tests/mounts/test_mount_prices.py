@@ -54,7 +54,7 @@ CASES = [
 
 
 def moved(problem: Problem, limit: Limit, side: str, step: float) -> float:
-    """The optimum with one side of a limit moved by a share of it."""
+    """Return the optimum with one side of a limit moved by a share of it."""
     if limit.outside is not None:
         low, high = limit.outside
         other = replace(limit, outside=(low * (1.0 + step), high) if side == "at most" else (low, high * (1.0 + step)))

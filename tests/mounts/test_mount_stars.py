@@ -242,7 +242,7 @@ def test_no_star_near_an_uneven_one_is_better(uneven):
 
 
 def _candidate(result):
-    """The star of a result."""
+    """Return the star of a result."""
     best = result.phasing.ranking[0]
     return Candidate(best.throws, best.firing_orders[0].order)
 

@@ -16,7 +16,7 @@ CHEAPEST = '[objective]\nminimise = "rms mount force"\n'
 
 
 def limited(limit: str, maximum: str) -> str:
-    """A limit of a problem file."""
+    """Return a limit of a problem file."""
     return f'[[constraints]]\nlimit = "{limit}"\nmax = "{maximum}"\n'
 
 

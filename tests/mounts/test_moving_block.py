@@ -43,7 +43,7 @@ STEPS, TURNS = 720, 30
 
 
 def linear_forces(piston: float, angles: np.ndarray, flywheel: float = 0.0, turns: bool = True) -> np.ndarray:
-    """Lateral and vertical force on either side, shape (n, 2, 2) [N]."""
+    """Return the lateral and vertical force on either side, shape (n, 2, 2) [N]."""
     crank = SliderCrank("one", 0.0, RADIUS, ROD, piston)
     wrench = shaking_loads(Engine("one", Cycle.TWO_STROKE, (crank,)), OperatingPoint("it", SPEED))
     # the piston rides at its mean height
@@ -65,14 +65,14 @@ def linear_forces(piston: float, angles: np.ndarray, flywheel: float = 0.0, turn
 
 
 def _body(system, place: float, mass: float, inertia: float, velocity: float = 0.0, rate: float = 0.0):
-    """A body at (place, 0) of the plane (X, Y) = (z, y)."""
+    """Return a body at (place, 0) of the plane (X, Y) = (z, y)."""
     node = system.AddNode(NodeRigidBody2D(referenceCoordinates=[place, 0, 0], initialVelocities=[0.0, velocity, rate]))
     return node, system.AddObject(ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node))
 
 
 @cache
 def simulated_forces(piston: float, flywheel: float = 1e-3, steps: int = STEPS) -> np.ndarray:
-    """The same from exudyn over the last turn, shape (steps, 2, 2) [N]."""
+    """Return the forces from exudyn over the last turn, shape (steps, 2, 2) [N]."""
     system = exu.SystemContainer().AddSystem()
     ground = system.AddObject(ObjectGround())
 

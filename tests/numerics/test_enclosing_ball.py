@@ -9,7 +9,7 @@ from laufruhe.numerics.norms.peak_to_peak import enclosing_balls
 
 
 def sets_of(kind: str, d: int) -> np.ndarray:
-    """Shape (40, 30, d)."""
+    """Return sets of shape (40, 30, d)."""
     rng = np.random.default_rng(d)
     points = rng.normal(size=(40, 30, d))
     if kind == "in a line":

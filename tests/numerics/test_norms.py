@@ -32,7 +32,7 @@ FINITE = st.floats(-1e3, 1e3, allow_subnormal=False)
 
 @st.composite
 def rows(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights, V and Z of one shape; zero rows and zero weights occur."""
+    """Return the weights, V and Z of one shape; zero rows and zero weights occur."""
     count, width = draw(st.integers(1, 5)), draw(st.integers(1, 3))
     weights = draw(arrays(float, count, elements=st.one_of(st.just(0.0), st.floats(1e-3, 10.0))))
     keep = draw(arrays(bool, count))[:, None]
@@ -41,12 +41,12 @@ def rows(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def one_signal(weights: np.ndarray) -> Grid:
-    """Rows that follow each other over one period."""
+    """Return the rows that follow each other over one period."""
     return Grid(weights, len(weights))
 
 
 def scene(seed: int) -> tuple[Grid, list[Spectrum], np.random.Generator]:
-    """Signals of a few operating points at two places each, and a grid of equal steps."""
+    """Return the signals of a few operating points at two places each, and a grid of equal steps."""
     rng = np.random.default_rng(seed)
     signals = []
     for _ in range(int(rng.integers(1, 4))):
@@ -57,23 +57,23 @@ def scene(seed: int) -> tuple[Grid, list[Spectrum], np.random.Generator]:
 
 
 def shares(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Weights of operating points, one in all."""
+    """Return the weights of operating points, one in all."""
     weights = rng.uniform(0.1, 1.0, count)
     return np.asarray(weights / weights.sum())
 
 
 def grid_of(points: np.ndarray, steps: int) -> Grid:
-    """Rows of (points, places, steps) in that order."""
+    """Return the rows of (points, places, steps) in that order."""
     return Grid(np.repeat(points, PLACES * steps) / (PLACES * steps), steps, points=len(points))
 
 
 def sampled(signals: list[Spectrum], steps: int) -> np.ndarray:
-    """Rows of that order."""
+    """Return the rows of that order."""
     return np.concatenate([s.sample(steps).swapaxes(0, 1).reshape(-1, 2) for s in signals])
 
 
 def fine_value(norm: Norm, signals: list[Spectrum], points: np.ndarray) -> float:
-    """Over the whole cycle, as far as many samples can tell."""
+    """Return the norm over the whole cycle, from many samples."""
     return norm.value(grid_of(points, FINE), sampled(signals, FINE))
 
 
@@ -95,7 +95,7 @@ ATTAINING: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 
 def centre_of(cones: Cones, v: np.ndarray) -> np.ndarray:
-    """The free vector from which the rows of one signal are counted, where the norm is least."""
+    """Return the free vector at which the norm of one signal is least."""
     c, heads = cp.Variable(v.shape[1]), cp.Variable(len(cones.value))
     scaled = [factor * (row - c) for factor, row in zip(cones.factors, v, strict=True)]
     parts = [cp.hstack(scaled)] if cones.is_single else scaled

@@ -39,7 +39,7 @@ def grid(count: int, groups: int = 1) -> Grid:
 
 
 def smallest_ball(points):
-    """Over all balls of two, three and four points, the smallest that holds all: brute force."""
+    """Return the smallest ball over all balls of two, three and four points that holds all points."""
     best = np.inf
     for size in range(2, points.shape[1] + 2):
         for subset in itertools.combinations(range(len(points)), size):

@@ -33,7 +33,7 @@ def spectra(draw: st.DrawFn, highest: int = 9) -> Spectrum:
 
 
 def direct(spectrum: Spectrum, angles: np.ndarray) -> np.ndarray:
-    """The definition C8, order by order."""
+    """Return the sum of definition C8, order by order."""
     total = np.zeros((len(angles), *spectrum.coefficients.shape[1:]))
     for j, c in enumerate(spectrum.coefficients):
         waves = j * float(spectrum.base) * angles

@@ -30,7 +30,7 @@ MOUNT_FORCE = '[objective]\nminimise = "mean mount force"\n'
 
 
 def shaft(name: str, ratio: float, reach: str = "250 mm", mass: str = "0 kg") -> str:
-    """An optional shaft with opposite unbalances at its ends."""
+    """Return an optional shaft with opposite unbalances at its ends."""
     return f"""
 [[balancer_shafts]]
 name = "{name}"
@@ -60,7 +60,7 @@ def problem(
     layout: str = "inline",
     samples: int = 192,
 ) -> Problem:
-    """An engine of small pistons with what is asked of it."""
+    """Return an engine of small pistons with what is asked of it."""
     text = f"""title = "test"
 [engine]
 layout = "{layout}"

@@ -172,5 +172,5 @@ class Writer:
 
 
 def random_text(seed: int) -> str:
-    """A problem file."""
+    """Return a problem file."""
     return Writer(seed).text()

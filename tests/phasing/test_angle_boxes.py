@@ -79,7 +79,7 @@ def _objective(name: str) -> str:
 
 
 def _at(problem: Problem, angle: float, of_bank: bool, order: tuple[int, ...] = (1, 2)) -> Problem:
-    """The problem with its open angle fixed [rad], cylinder 1 at its dead centre when phi = 0."""
+    """Return the problem with its open angle fixed [rad], cylinder 1 at its dead centre when phi = 0."""
     phasing = problem.phasing
     geometry = (angle, phasing.split[0] if phasing.split else 0.0) if of_bank else (phasing.bank[0], angle)
     layout = phasing.layout(*geometry)
@@ -105,7 +105,7 @@ angle = 20
 
 
 def _drawn(rng: np.random.Generator, window: FiringWindow) -> Array | None:
-    """Random throws and angles that keep a window."""
+    """Return the random throws and angles that keep a window."""
     low, high = window.box
     for k in rng.permutation(len(low)):
         here = np.arange(len(low)) == k

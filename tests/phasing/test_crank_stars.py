@@ -19,7 +19,7 @@ RADIUS, LAMBDA, MASS, SPACING, SPEED = 0.06, 0.26, 1.25, 0.125, 200.0
 
 
 def score_stars(stars, phases, x, orders):
-    """|F_h| and |C_h| of many stars."""
+    """Return |F_h| and |C_h| of many stars."""
     sizes = np.abs(star_sums(stars, phases, x, orders))
     return sizes[..., 0], sizes[..., 1]
 

@@ -18,7 +18,7 @@ NORMS = ("rms", "mean", "maximum", "peak to peak")
 
 
 def random_problem(folder, seed):
-    """An engine that can fire evenly, its throws open, with a random sum of measures."""
+    """Return an engine that can fire evenly, its throws open, with a random sum of measures."""
     rng = np.random.default_rng(seed)
     cycle = ("two-stroke", "four-stroke")[seed % 2]
     vee = seed % 4 > 0
@@ -46,7 +46,7 @@ def random_problem(folder, seed):
 
 
 def even_cranks(phasing, geometry):
-    """Throws of every crank whose dead centres are as many firings apart as there are cylinders."""
+    """Yield the throws of every crank whose dead centres are as many firings apart as there are cylinders."""
     layout, count = phasing.layout(*geometry), phasing.cylinders
     steps = count // math.gcd(phasing.cycle.turns, count)
     first = layout.banks[0] - layout.pin_offsets[0]

@@ -76,7 +76,7 @@ def scene(folder, name):
 
 
 def programs_of(problem, phasing, window, samples=64):
-    """Programs of boxes, as the search makes them."""
+    """Return the programs of boxes, as the search makes them."""
     throws = nearest_throws(window, 0.5 * sum(window.box))
     candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
     realised = replace(phasing.problem_of(candidate), phasing=None)
@@ -87,7 +87,7 @@ def programs_of(problem, phasing, window, samples=64):
 
 
 def drawn(rng, window):
-    """Random throws that keep a window."""
+    """Return the random throws that keep a window."""
     low, high = window.box
     for k in rng.permutation(len(low)):
         here = np.arange(len(low)) == k
@@ -97,13 +97,13 @@ def drawn(rng, window):
 
 
 def exact(phasing, window, throws):
-    """The problem of one crank."""
+    """Return the problem of one crank."""
     candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
     return replace(phasing.problem_of(candidate), phasing=None)
 
 
 def best_of(phasing, window, throws):
-    """The objective of one crank, unbalances at their proven optimum; infinite where it breaks a limit."""
+    """Return the objective of one crank, unbalances at their proven optimum; infinite where it breaks a limit."""
     given = exact(phasing, window, throws)
     return StarDesign(Candidate(tuple(throws)), solve_fixed(given)).value
 

@@ -34,7 +34,7 @@ SCENES = {
 
 
 def scene(folder, name, rest=MOUNT_FORCE):
-    """A star with its firing order, what may move of it, and its problem."""
+    """Return a star with its firing order, what may move of it, and its problem."""
     layout, cycle, count, order, angles = SCENES[name]
     open_ = engines.OPEN + (SPLIT if angles else "")
     phasing = engines.problem(folder, count, cycle, open_, ALLOWED, GAS + rest, layout, 480).phasing
@@ -58,7 +58,7 @@ def model_of(phasing, start, at):
 
 
 def moved(moves, x):
-    """Symbols at deviations x, and the exact problem there."""
+    """Return the symbols at deviations x, and the exact problem there."""
     return UnevenSymbols(*moves.angles(x), ca.DM(0, 1)), replace(
         moves.phasing.problem_of(moves.candidate(x)), phasing=None
     )

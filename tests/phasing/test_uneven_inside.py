@@ -58,7 +58,7 @@ LOADS = (
 
 
 def problem_of(engine: dict[str, Any], quantity: str, throws: int = 3, **changes: Any) -> Problem:
-    """An engine with a bearing on either side of every throw; a key of `told` that is None is left out."""
+    """Return an engine with a bearing on either side of every throw; a key of `told` that is None is left out."""
     half = 62.5 * throws
     bare = {key: value for key, value in THREE["engine"].items() if key not in ("firing_order", "throws")}
     whole = {key: value for key, value in THREE.items() if key not in ("constraints", "counterweights")}
@@ -152,7 +152,7 @@ DECIDED = {
 
 @cache
 def decided(quantity: str) -> tuple[Problem, Result]:
-    """Throws between bounds; beside loads of bearings a weight."""
+    """Return the throws between bounds; beside loads of bearings a weight."""
     settings = DECIDED[quantity] | ({} if "bearing" in quantity else {"counterweights": None})
     problem = problem_of(BETWEEN | ({"cycle": "two-stroke"} if "twist" in quantity else {}), quantity, **settings)
     return problem, laufruhe.solve(problem)

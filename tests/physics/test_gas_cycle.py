@@ -52,7 +52,7 @@ every_cycle = pytest.mark.parametrize("cycle", list(Cycle), ids=lambda cycle: cy
 
 
 def _volume(part: SliderCrank, angle: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Piston travel below its highest position over the stroke, from the triangle itself."""
+    """Return the piston travel below its highest position over the stroke, from the triangle itself."""
     alpha = part.shaft.ratio * np.asarray(angle)
     r, e = part.crank_radius, part.offset
     if math.isinf(part.rod_length):
@@ -115,7 +115,7 @@ class TestMeanPressure:
 
 
 def _seiliger_loop(gas: Seiliger, cycle: Cycle, cut_off: float) -> float:
-    """Work of the mixed cycle over the displacement, by quadrature in mpmath."""
+    """Return the work of the mixed cycle over the displacement, by quadrature in mpmath."""
     with mpmath.workdps(30):
         clearance = 1 / (mpmath.mpf(gas.compression_ratio) - 1)
         largest, knee = clearance + 1, clearance * cut_off
@@ -261,7 +261,7 @@ class TestJumps:
 
 
 def _integrated(gas: Wiebe, part: SliderCrank, heat: float, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """dp/dgamma = -kappa p V'/V + (kappa - 1)/V dQ/dgamma through the closed period, restarted where it bends."""
+    """Return the pressure from dp/dgamma = -kappa p V'/V + (kappa - 1)/V dQ/dgamma through the closed period."""
     clearance, a = 1.0 / (gas.compression_ratio - 1.0), -math.log(1.0 - gas.completeness)
     _, bottom = dead_centres(part)
     first, begin, end = bottom - math.tau, gas.start, gas.start + gas.duration
@@ -610,7 +610,7 @@ class TestHasselgruber:
     """Fig. 2: D = 100 mm, s = 120 mm, p_max = 80 kp/cm2, p_i = 9 kp/cm2, b = 504 mm give a mount force of 300 kp."""
 
     def force(self, gas: Seiliger) -> float:
-        """Largest A = T / b in kp (eq. 1)."""
+        """Return the largest A = T / b in kp (eq. 1)."""
         part, samples = PARTS["plain"], 7200
         angles = 4 * math.pi * np.arange(samples) / samples
         load = cylinder_pressure(gas, part, Cycle.FOUR_STROKE, samples) - gas.crankcase_pressure

@@ -73,7 +73,7 @@ PLACES = st.floats(-0.5, 0.5).map(lambda x: round(x, 6))
 
 @st.composite
 def bodies(draw: st.DrawFn, cycle: Cycle, shafts: Sequence[Shaft], number: int, alike: tuple[float, ...]) -> Bodies:
-    """A cylinder at its own place; with `alike` the mechanism is that of the other cylinders."""
+    """Return a cylinder at its own place; with `alike` the mechanism is that of the other cylinders."""
     radius, rod_ratio, offset_share, piston, mass, gravity, inertia = alike or draw(mechanisms())
     shaft, throw, bank = draw(st.sampled_from(shafts)), draw(ANGLES), draw(ANGLES)
     rod = Rod(radius / rod_ratio, mass, gravity * radius / rod_ratio, inertia) if rod_ratio else None
@@ -99,7 +99,7 @@ def bodies(draw: st.DrawFn, cycle: Cycle, shafts: Sequence[Shaft], number: int, 
 
 @st.composite
 def mechanisms(draw: st.DrawFn) -> tuple[float, ...]:
-    """Radius, rod ratio (0 a yoke), offset as a share of what turns, masses of piston and rod, its c.g., inertia."""
+    """Draw radius, rod ratio (0 a yoke), share of offset, masses of piston and rod, centre of gravity, inertia."""
     return (
         draw(st.floats(0.02, 0.2)),
         draw(st.one_of(st.just(0.0), st.floats(0.05, 0.6))),
@@ -113,7 +113,7 @@ def mechanisms(draw: st.DrawFn) -> tuple[float, ...]:
 
 @st.composite
 def scenes(draw: st.DrawFn, ratios: Sequence[float] = (-1.0,)) -> Scene:
-    """Up to five cylinders, alike or each its own, on one crank or two, and up to three rotors.
+    """Return the up to five cylinders, alike or each its own, on one crank or two, and up to three rotors.
 
     The second crank has one of the `ratios`, and with half ratios the cycle four strokes.
     """
@@ -144,7 +144,7 @@ def of_parts(engine: Engine, change: Callable[[SliderCrank], SliderCrank]) -> En
 
 
 def assert_same(found: Spectrum, expected: NDArray[np.complex128], tolerance: float = 1e-12) -> None:
-    """Coefficients agree, each component within rounding of the largest load: positions are metres."""
+    """Check that coefficients agree within rounding of the largest load; positions are in metres."""
     size = max(float(np.abs(expected).max()), float(np.abs(found.coefficients).max()))
     length = max(len(expected), len(found.coefficients))
 
@@ -284,7 +284,7 @@ def _size(loads: Spectrum) -> float:
 
 
 def _momentum_change(scene: Scene, angle: float) -> NDArray[np.float64]:
-    """Wrench on the block by differences of momentum and energy; with 50 digits their error is nothing."""
+    """Return the wrench on the block by differences of momentum and energy; with 50 digits their error is nothing."""
     with mp.workdps(50):
         step, phi = mp.mpf(10) ** -12, mp.mpf(angle)
         after, before = (_momentum(scene, phi + s * step) for s in (1, -1))
@@ -294,7 +294,7 @@ def _momentum_change(scene: Scene, angle: float) -> NDArray[np.float64]:
 
 
 def _momentum(scene: Scene, phi: mp.mpf) -> list[mp.mpf]:
-    """Momentum and angular momentum about the origin per unit of crank speed, and kinetic energy per its square."""
+    """Return momentum and angular momentum per unit of crank speed, and kinetic energy per its square."""
     step = mp.mpf(10) ** -15
     total = [mp.mpf(0)] * 7
     now, later, earlier = (_places(scene, phi + s * step) for s in (0, 1, -1))
@@ -312,7 +312,7 @@ def _momentum(scene: Scene, phi: mp.mpf) -> list[mp.mpf]:
 
 
 def _places(scene: Scene, phi: mp.mpf) -> list[tuple[mp.mpf, mp.mpf, mp.mpc, mp.mpf, mp.mpf]]:
-    """Mass, x, place zeta = z + i y, inertia, and tilt of every rigid body."""
+    """Return the mass, x, place zeta = z + i y, inertia, and tilt of every rigid body."""
     out = []
     for body in scene.bodies:
         part = body.part
@@ -377,7 +377,7 @@ class TestGas:
 
 
 def _star(count: int, order: Sequence[int], offset: float = 0.0, deficit: float = 0.0) -> Engine:
-    """An inline engine with an even star, its throws taken in any order."""
+    """Return an inline engine with an even star, its throws taken in any order."""
     parts = tuple(
         SliderCrank(
             f"cylinder {k + 1}",

@@ -25,7 +25,7 @@ TURNS = st.tuples(*[st.floats(-math.pi, math.pi)] * 3)
 
 
 def rotation(angles: Sequence[float]) -> NDArray[np.float64]:
-    """Turns about x, then y, then z."""
+    """Return the rotation about x, then y, then z."""
     (cx, cy, cz), (sx, sy, sz) = np.cos(angles), np.sin(angles)
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
@@ -40,7 +40,7 @@ def as_rows(matrix: NDArray[np.float64]) -> Matrix3:
 
 @st.composite
 def mountings(draw: st.DrawFn) -> tuple[Mount, ...]:
-    """Three to six springs that carry every direction, some of them turned."""
+    """Return the three to six springs that carry every direction, some of them turned."""
     mounts = tuple(
         Mount(
             f"mount {k}",
@@ -60,7 +60,7 @@ WRENCHES = st.lists(st.complex_numbers(max_magnitude=1e3), min_size=6, max_size=
 
 
 def driven(wrench: NDArray[np.complex128]) -> Spectrum:
-    """A wrench of first order."""
+    """Return a wrench of first order."""
     return Spectrum(Fraction(1), np.array([np.zeros(6), wrench]))
 
 
@@ -143,7 +143,7 @@ class TestStatics:
 
 
 def _cross(place: tuple[float, float, float]) -> NDArray[np.float64]:
-    """omega x r as a matrix on omega."""
+    """Return the matrix of omega x r on omega."""
     x, y, z = place
     return np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
 

@@ -55,25 +55,25 @@ def _root(sine: mp.mpf) -> mp.mpf:
 
 
 def acceleration(c: mp.mpf, s: mp.mpf, lam: mp.mpf, eps: mp.mpf) -> mp.mpf:
-    """s''/r at c = cos alpha, s = sin alpha: c + sqrt(1 - u^2) / lambda derived twice, u = sin psi = lambda s - eps."""
+    """Return s''/r at c = cos alpha, s = sin alpha from c + sqrt(1 - u^2) / lambda, u = sin psi = lambda s - eps."""
     u, slope = lam * s - eps, lam * c
     root = _root(u)
     return -c - ((slope**2 - u * lam * s) / root + (u * slope) ** 2 / root**3) / lam
 
 
 def velocity(c: mp.mpf, s: mp.mpf, lam: mp.mpf, eps: mp.mpf) -> mp.mpf:
-    """s'/r."""
+    """Return s'/r."""
     u = lam * s - eps
     return -s - u * c / _root(u)
 
 
 def inertia_roll(c: mp.mpf, s: mp.mpf, lam: mp.mpf, eps: mp.mpf) -> mp.mpf:
-    """-s''/r (s'/r + e/r): the roll moment of a reciprocating mass on a forward crank."""
+    """Return -s''/r (s'/r + e/r), the roll moment of a reciprocating mass on a forward crank."""
     return -acceleration(c, s, lam, eps) * (velocity(c, s, lam, eps) + eps / lam)
 
 
 def rod_roll(c: mp.mpf, s: mp.mpf, lam: mp.mpf, eps: mp.mpf) -> mp.mpf:
-    """-psi'' (1 + psi'): the roll moment of a rod's inertia deficit on a forward crank."""
+    """Return -psi'' (1 + psi'), the roll moment of a rod's inertia deficit on a forward crank."""
     u = lam * s - eps
     rate = lam * c / _root(u)
     return -(rate**2 * u - lam * s) / _root(u) * (1 + rate)
@@ -81,7 +81,7 @@ def rod_roll(c: mp.mpf, s: mp.mpf, lam: mp.mpf, eps: mp.mpf) -> mp.mpf:
 
 @lru_cache(maxsize=64)
 def _reference(kernel: Kernel, rod_ratio: float, offset_ratio: float) -> tuple[mp.mpc, ...]:
-    """Coefficients 0 ... 12 of a kernel, to 50 digits of the smallest that the geometry allows.
+    """Return the coefficients 0 ... 12 of a kernel, to 50 digits of the smallest that the geometry allows.
 
     The trapezoidal rule on equal steps is exact but for orders folded back, which fall as q^steps with q the modulus
     of the pole nearest to the unit circle; steps and digits follow from q.
@@ -226,7 +226,7 @@ class TestAgainstFFT:
 
 @st.composite
 def turning_cranks(draw: st.DrawFn) -> tuple[float, float]:
-    """lambda and epsilon with lambda + |epsilon| <= 0.97."""
+    """Return lambda and epsilon with lambda + |epsilon| <= 0.97."""
     rod_ratio = draw(st.floats(1e-3, 0.95))
     return rod_ratio, draw(st.floats(-1.0, 1.0)) * (0.97 - rod_ratio)
 

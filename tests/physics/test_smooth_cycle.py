@@ -30,7 +30,7 @@ TORQUE = (cycle_pressure(FINE) - 1.0) * BAR * AREA * lever(FINE)
 
 
 def noisy(step: float, noise: float, seed: int) -> tuple[Array, Array]:
-    """Angles and pressures of a cycle with normal noise [bar]."""
+    """Return the angles and pressures of a cycle with normal noise [bar]."""
     degrees = -360.0 + step * np.arange(round(720.0 / step))
     dice = np.random.default_rng(seed)
     return np.radians(degrees), BAR * (cycle_pressure(degrees) + noise * dice.standard_normal(len(degrees)))

@@ -30,7 +30,7 @@ def needed(problem: Problem) -> TurningTorque:
 
 
 def by_hand(problem: Problem, ratio: float, exponent: float, idle: tuple[str, ...] = ()) -> tuple[float, float]:
-    """Largest -sum (p - p_0) dV/dphi x (-1) with p V^n = constant in compression and expansion, at 0.05 degrees."""
+    """Return the largest sum (p - p_0) dV/dphi with p V^n = constant in compression and expansion, at 0.05 degrees."""
     engine = problem.engine
     phi = np.radians(np.arange(0.0, 720.0, 0.05))
     total = np.zeros(len(phi))

@@ -72,7 +72,7 @@ TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 
 
 
 def lab(colour: str, eye: str) -> np.ndarray:
-    """CIE L*a*b* of a colour as an eye sees it."""
+    """Return the CIE L*a*b* of a colour as an eye sees it."""
     rgb = np.array(to_rgb(colour))
     linear = np.clip(SEEN[eye] @ np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4), 0.0, 1.0)
     x, y, z = np.cbrt(np.maximum(TO_XYZ @ linear / (0.9505, 1.0, 1.089), 1e-4))

@@ -26,7 +26,7 @@ SUN, MOON = "\u65e5", "\u6708"
 
 
 def install(folder: Path, name: str, drawn: str) -> None:
-    """A font that has these letters alone, each a square as wide as a line is high."""
+    """Install a font with these letters alone, each a square of the height of a line."""
     pen = TTGlyphPen(None)
     for k, corner in enumerate([(0, 0), (0, 900), (900, 900), (900, 0)]):
         (pen.lineTo if k else pen.moveTo)(corner)

@@ -12,7 +12,7 @@ from laufruhe.studies.kinds import KINDS
 
 
 def part(objective: list[float], proof: list[str], **coords: list[object]) -> xr.Dataset:
-    """A dataset as studies make it, of these objectives."""
+    """Return a dataset as studies make it, of these objectives."""
     names = [f"case {k}" for k in range(len(objective))]
     values = {name: ("point", np.array(entries)) for name, entries in {"case": names, **coords}.items()}
     data = xr.Dataset(

@@ -31,7 +31,7 @@ PROBLEM, STUDY = HERE / "six-bank.toml", HERE / "study.toml"
 
 
 def installed(folder: Path, points: str | None = None) -> dict[str, str]:
-    """Install the package into a folder as pip does, and return the environment of processes that see it."""
+    """Install the package into a folder as pip does, and return the environment of its processes."""
     about = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     shutil.copytree(HERE / "laufruhe_example", folder / "laufruhe_example", dirs_exist_ok=True)
     metadata = folder / f"laufruhe_example-{about['version']}.dist-info"

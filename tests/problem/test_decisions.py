@@ -60,7 +60,7 @@ def problem_of(folder: Path, text: str) -> Problem:
 
 
 def coupled(how: str, then: str) -> str:
-    """The shafts of a leader, of its follower, and of the follower of that."""
+    """Return the shafts of a leader, of its follower, and of the follower of that."""
     leader = shaft("leader", 2, "100 mm", open_unbalance("1 kg m", '"0.3 kg m"', "40"))
     followers = f"""
 name = "front"

@@ -41,7 +41,7 @@ def vector(d: Domain, pair: tuple[float, float]) -> Array:
 
 
 def points(d: Domain) -> Array:
-    """A fine grid over the set, corners and the arc's own points among them, shape (n, width)."""
+    """Return a fine grid over the set, corners and the arc's own points among them, shape (n, width)."""
     decision = d.decision
     if d.width == 1:
         return np.linspace(decision.lower, decision.upper, 201)[:, None]

@@ -9,7 +9,7 @@ from laufruhe.prove.mounts.box_series import directions_of, mapped, norm_over, s
 
 
 def scene(seed: int, ranks: tuple[int, ...], damped: float = 0.1) -> dict[str, np.ndarray]:
-    """D = K (1 + i eta) - w^2 of six motions, springs along few directions, and the forces in them."""
+    """Return a random D = K (1 + i eta) - w^2 of six motions with springs along few directions."""
     rng = np.random.default_rng(seed)
     along = [rng.normal(size=(6, rank)) for rank in ranks]
     sides = np.array([(1.0 + 1j * damped * rng.random()) * each @ each.T for each in along])

@@ -80,7 +80,7 @@ def random_point(rng: np.random.Generator, problem: AffineProblem) -> Array:
 
 
 def random_problem(rng: np.random.Generator) -> tuple[AffineProblem, Array]:
-    """A problem and a design that keeps its limits, some of them just so."""
+    """Return a problem and a design that keeps its limits, some of them just so."""
     domains = random_domains(rng)
     size = sum(domain.width for domain in domains)
     terms = tuple((float(rng.uniform(0.1, 3)), random_norm(rng, size)) for _ in range(int(rng.integers(1, 4))))
@@ -94,7 +94,7 @@ def random_problem(rng: np.random.Generator) -> tuple[AffineProblem, Array]:
 
 
 def random_multipliers(rng: np.random.Generator, problem: AffineProblem, x: Array) -> Multipliers:
-    """Anything at all, or something near what a solver would say."""
+    """Return random multipliers, or some near those of a solver."""
 
     def rows(norm: AffineNorm) -> Array:
         own = norm.subgradient(x)

@@ -16,7 +16,7 @@ from phasing import engines
 
 
 def ends_of(count: int, cycle: float, low: float, high: float) -> set[tuple[float, ...]]:
-    """Intervals that are least or most but for one of them, and add up to a cycle, in every order."""
+    """Return the intervals that are least or most but for one of them, and add up to a cycle, in every order."""
     found = set()
     for maximum in range(count):
         left = cycle - maximum * high - (count - 1 - maximum) * low

@@ -82,7 +82,7 @@ def stiffness_problem(folder: Path, text: str, more: str = "", mounts: str = DAM
 
 
 def boxes(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Boxes within the bounds, from nearly all of them to a thousandth, stiffness by ratio."""
+    """Return the boxes within the bounds, from nearly all of them to a thousandth, stiffness by ratio."""
     generator = np.random.default_rng(seed)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     centres = low * (high / low) ** generator.random((count, len(low)))

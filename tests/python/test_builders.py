@@ -34,7 +34,7 @@ unit = pint.UnitRegistry()
 
 
 def problem_tables(name: str) -> dict[str, Any]:
-    """Tables of a ready problem; a test of a study is skipped."""
+    """Return the tables of a ready problem; a test of a study is skipped."""
     data = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))
     if "study" in data:
         pytest.skip("a study has no engine")
@@ -42,14 +42,14 @@ def problem_tables(name: str) -> dict[str, Any]:
 
 
 def table_functions(place: Place) -> list[Callable[..., Any]]:
-    """Functions for the tables that may stand at an address."""
+    """Return the functions for the tables that may stand at an address."""
     above, here = ({leaf.__name__ for leaf in tables_on(file_model(), path)} for path in (place, (*place, "")))
     names = [python_tables.snake(name) for name in here - above]
     return [getattr(tables, name) for name in names if hasattr(tables, name)]
 
 
 def called(node: Any, place: Place) -> Any:
-    """Tables inside a table, each made by its function."""
+    """Return the tables inside a table, each made by its function."""
     if isinstance(node, list):
         return [called(entry, (*place, k)) for k, entry in enumerate(node)]
     if not isinstance(node, dict):
@@ -72,7 +72,7 @@ def takes(call: Callable[..., Any], named: Mapping[str, Any]) -> bool:
 
 
 def in_code(found: Mapping[str, Any]) -> Problem:
-    """The problem of the tables of a file, made by calls in Python."""
+    """Return the problem of the tables of a file, made by calls in Python."""
     table = found["engine"] if isinstance(found["engine"], dict) else {"catalogue": found["engine"]}
     keys = {key: called(entry, ("engine", key)) for key, entry in table.items() if key != "layout"}
     engine = getattr(laufruhe, table["layout"].replace("-", "_") if "layout" in table else "engine")(**keys)
@@ -102,17 +102,17 @@ Write = Callable[[Number, Any], Any]
 
 
 def in_degrees(number: Number, raw: Any) -> Any:
-    """An angle with its unit; other numbers as they are."""
+    """Return an angle with its unit; other numbers as they are."""
     return f"{raw!r} deg" if number.plain is not None and not isinstance(raw, str) else raw
 
 
 def in_si(number: Number, raw: Any) -> Any:
-    """A bare SI number; one with a tolerance as it is."""
+    """Return a bare SI number; one with a tolerance as it is."""
     return raw if isinstance(raw, str) and any(mark in raw for mark in ("±", "+-", "+/-")) else number.read(raw)
 
 
 def rewritten(found: Mapping[str, Any], write: Write) -> dict[str, Any]:
-    """The tables with all numbers written in another way."""
+    """Return the tables with all numbers written in another way."""
     changed = dict(found)
     for place, node in walk(found):
         number = number_at(file_model(), place)
@@ -154,7 +154,7 @@ def test_functions_are_those_of_the_models(path: Any) -> None:
 
 
 def models() -> dict[str, tuple[Place, set[str]]]:
-    """Keys of every table of a problem file, with an address where it stands."""
+    """Return the keys of every table of a problem file, with an address where it stands."""
     found: dict[str, tuple[Place, set[str]]] = {}
     left: list[Place] = [()]
     while left:

@@ -26,7 +26,7 @@ PARTS = {
 
 
 def unlabelled(data: xr.Dataset) -> list[str]:
-    """Variables without a name, or numbers without a unit and without the coordinate of their units."""
+    """Return the variables without a name, or numbers without a unit and without the coordinate of their units."""
     faults = []
     for name, values in data.variables.items():
         has_unit = values.attrs.get("unit_of", "") in data.coords or bool(values.attrs.get("units"))

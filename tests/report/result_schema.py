@@ -10,7 +10,7 @@ TEXT = {"type": "string"}
 
 
 def table(**properties: Any) -> dict[str, Any]:
-    """An object that has all of these keys; it may have more."""
+    """Return an object that has all of these keys; it may have more."""
     return {"type": "object", "properties": properties, "required": list(properties)}
 
 

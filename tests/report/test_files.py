@@ -68,7 +68,7 @@ def add_meanwhile(folder: Path, name: str) -> None:
 
 
 def held(folder: Path) -> tuple[set[str], set[str]]:
-    """Names and contents of a set."""
+    """Return the names and contents of a set."""
     found = {path.name: path.read_text() for path in folder.glob("file-*")}
     return set(found), set(found.values())
 

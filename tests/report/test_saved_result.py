@@ -32,7 +32,7 @@ def fields(thing: object) -> str:
 
 
 def is_read_back(result: Result, folder: Path) -> None:
-    """Everything that both have is the same, to the last bit."""
+    """Check that all fields of both are equal to the last bit."""
     actual = saved(result, folder, series=True)
     assert (actual.name, actual.title) == (result.problem.name, result.problem.title)
     assert (actual.status, actual.message, actual.conflict) == (result.status, result.message, result.conflict)

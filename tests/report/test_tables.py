@@ -228,7 +228,7 @@ WIDE = Table(
 
 
 def document_on(width: int, *blocks: Bullets | Table | Paragraph) -> list[str]:
-    """Lines of a document on a screen of some width."""
+    """Return the lines of a document on a screen of some width."""
     stream = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("laufruhe.report.screen.PIPE_WIDTH", width)

@@ -80,7 +80,7 @@ def problem_of(limits: list[dict[str, Any]], **changes: Any) -> Problem:
 
 
 def grid_of(problem: Problem) -> Iterator[Evaluation]:
-    """Designs over the whole of the bounds of one weight, by the exact model alone."""
+    """Yield the designs over the whole of the bounds of one weight, by the exact model alone."""
     (weight,) = problem.decisions
     for size, angle in itertools.product(np.linspace(0.0, weight.set.upper, 11), np.linspace(-math.pi, math.pi, 25)):
         yield evaluate(problem, problem.design([cmath.rect(size, angle)]))
@@ -92,7 +92,7 @@ def keeps(found: Evaluation, limits: tuple[Limit, ...]) -> bool:
 
 @pytest.fixture(autouse=True)
 def _enough_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a slow machine, and where calls are traced, all limits are looked at as elsewhere."""
+    """Give all limits enough time on a slow machine, and where calls are traced."""
     monkeypatch.setattr("laufruhe.solvers.attainable_limits.MIN_SECONDS", 600.0)
 
 
@@ -167,7 +167,7 @@ OPEN = {"between": ["50 N/mm", "800 N/mm"], "start": "300 N/mm"}
 
 
 def mounts_of(front: dict[str, Any], rear: Any = OPEN) -> dict[str, Any]:
-    """Two pairs of mounts, one open number of each or more."""
+    """Return two pairs of mounts, each with one open number or more."""
     front = {"name": "front", "position": POSITIONS[0], "stiffness": ["100 N/mm", "100 N/mm", OPEN]} | front
     tables = {"name": "rear", "position": POSITIONS[2], "stiffness": ["100 N/mm", "100 N/mm", rear]}
     return {"kind": "elastic", "loss_factor": 0.1,

@@ -33,7 +33,7 @@ NAMES = ("tractor-single", "tractor-two", "tractor-four-lanchester", "tractor-fo
 
 
 def _stated(norm: AffineNorm, x: Any) -> Any:
-    """A norm of rows, by its definition."""
+    """Return a norm of rows, by its definition."""
     k, d = norm.constant.shape
     rows = cp.reshape(norm.slope.reshape(k * d, -1) @ x, (k, d), order="C") + norm.constant
     weights, steps = norm.grid.weights, norm.grid.steps
@@ -54,7 +54,7 @@ def _stated(norm: AffineNorm, x: Any) -> Any:
 
 
 def stated(problem: AffineProblem) -> float:
-    """The optimum by cvxpy, every decision in units of its bound."""
+    """Return the optimum by cvxpy, every decision in units of its bound."""
     y = cp.Variable(problem.size)
     x = cp.multiply(problem.scales, y)
     held = []

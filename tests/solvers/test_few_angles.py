@@ -50,7 +50,7 @@ def single(*limits: dict[str, str]) -> Problem:
 
 
 def mounted() -> dict[str, Any]:
-    """A block on four mounts."""
+    """Return a block on four mounts."""
     corners = [(200, 200), (200, -200), (-200, 200), (-200, -200)]
     places = [
         {"name": f"mount {k}", "position": [f"{x} mm", f"{y} mm", "0 mm"], "stiffness": ["100 N/mm"] * 3}
@@ -111,7 +111,7 @@ def test_a_limit_that_is_all_but_the_least_has_a_design(samples: int) -> None:
 
 
 def out_of_reach() -> Problem:
-    """The force is no less than 1071.66270 N, but 480 angles read 1.8e-5 less of that design."""
+    """Return a problem whose force is at least 1071.66270 N, of which 480 angles read 1.8e-5 less."""
     tables = {
         **SINGLE, "fidelity": {"samples": 60}, "objective": {"minimise": "rms shaking force"},
         "constraints": [{"name": "quiet", "limit": "mean shaking force", "max": "1071.64877 N"}],
@@ -226,7 +226,7 @@ LEAST = 2.28031126625055
 
 
 def on_open_mounts(throw: float, **changes: Any) -> Problem:
-    """A single whose one stiffness is open; few angles read up to a third of a percent too much or too little."""
+    """Return a single with one open stiffness, which few angles misread by up to a third of a percent."""
     tables = {
         **SINGLE, **mounted(), "engine": {**SINGLE["engine"], "throws": [throw]}, "balancer_shafts": [], **changes,
     }  # fmt: skip

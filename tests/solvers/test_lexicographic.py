@@ -41,7 +41,7 @@ PLACES = {"single-road-roller": (-0.1 + 0.4j), "single-bob-weights": (-0.29 + 0.
 
 
 def masses_of(name: str) -> list[mm.Mass]:
-    """The single with these weights, as masses on their ways."""
+    """Return the single with these weights, as masses on their ways."""
     factor, along, against = MACHINES[name]
     pin = mm.crank_pin(RADIUS)
     place = complex(PLACES[name])
@@ -56,7 +56,7 @@ def masses_of(name: str) -> list[mm.Mass]:
 
 
 def bearing_force(factor: float) -> float:
-    """Mean force on each of two main bearings: piston and rod on the pin, and the weight, shared evenly."""
+    """Return the mean force on each of two main bearings: piston and rod on the pin, and the weight, shared evenly."""
     pin = mm.crank_pin(RADIUS)
     piston = mm.piston(pin, ROD, 0.0)
     push = -PISTON * SPEED**2 * mm.differentiated(piston).real

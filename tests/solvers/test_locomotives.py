@@ -24,7 +24,7 @@ FORCE = MASS * RADIUS * SPEED**2
 
 
 def limited(share: float) -> Problem:
-    """Surging and swaying as a balanced share of the reciprocating masses leaves them."""
+    """Return the surging and swaying as a balanced share of the reciprocating masses leaves them."""
     return laufruhe.load(PROBLEMS / "locomotive-two-cylinder.toml").with_values(
         {
             "constraints.surging.max": f"{math.sqrt(2.0) * (1.0 - share) * FORCE} N",

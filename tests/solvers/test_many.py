@@ -24,7 +24,7 @@ def ready(name: str) -> Problem:
 
 
 def drawn(problem: Problem, count: int) -> dict[str, np.ndarray]:
-    """Random values of every open number and open angle."""
+    """Return the random values of every open number and open angle."""
     random, designs = np.random.default_rng(7), dict[str, np.ndarray]()
     for decision in problem.decisions:
         designs[decision.name] = random.uniform(decision.lower, decision.upper, count)
@@ -34,7 +34,7 @@ def drawn(problem: Problem, count: int) -> dict[str, np.ndarray]:
 
 
 def written(designs: dict[str, np.ndarray], table: pd.DataFrame, row: int) -> dict[str, Any]:
-    """The numbers of one design, as a file writes them."""
+    """Return the numbers of one design, as a file writes them."""
     units = table.attrs["units"]
     return {name: f"{float(column[row])!r} {units[name]}".strip() for name, column in designs.items()}
 

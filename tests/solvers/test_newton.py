@@ -26,7 +26,7 @@ ROWS = 120
 
 
 def domains(rng: np.random.Generator, count: int, upper: float) -> tuple[Domain, ...]:
-    """Intervals from zero and discs, one after another."""
+    """Return the intervals from zero and discs, one after another."""
     built: list[Domain] = []
     for k in range(count):
         size = upper * float(rng.uniform(0.5, 2.0))
@@ -36,7 +36,7 @@ def domains(rng: np.random.Generator, count: int, upper: float) -> tuple[Domain,
 
 
 def load_norm(rng: np.random.Generator, name: str, rank: int, columns: int, rows: int = ROWS) -> AffineNorm:
-    """Rows of three orders with two components, whose slopes have a rank."""
+    """Return the rows of three orders with two components, whose slopes have a rank."""
     angle = 2.0 * np.pi * np.arange(rows) / rows
     waves = np.stack([wave(order * angle) for order in (1, 2, 3) for wave in (np.cos, np.sin)], axis=1)
     free = np.einsum("ko,odr->kdr", waves, rng.standard_normal((6, 2, rank)))
@@ -46,7 +46,7 @@ def load_norm(rng: np.random.Generator, name: str, rank: int, columns: int, rows
 
 
 def masses(rng: np.random.Generator, columns: int) -> AffineNorm:
-    """A sum of masses, one row for each column."""
+    """Return a sum of masses, one row for each column."""
     slope = np.zeros((columns, 1, columns))
     slope[np.arange(columns), 0, np.arange(columns)] = rng.uniform(0.5, 2.0, columns)
     return AffineNorm(NORMS["mean"], np.zeros((columns, 1)), slope, Grid(np.ones(columns), 1))

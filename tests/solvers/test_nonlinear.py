@@ -179,7 +179,7 @@ def test_many_starts_find_the_best_of_several_optima_in_every_order():
 
 
 def waves(softness: float = 0.0) -> NonlinearProgram:
-    """Five optima, one of them best, and the same in two stages, the first of which is under the second."""
+    """Return the five optima, one of them best, and the same in two stages, the first of which is under the second."""
     x, e = ca.SX.sym("x", 1), ca.SX.sym("e")
     return NonlinearProgram(
         x, ca.sin(5 * x[0]) + 0.1 * x[0] ** 2 - e, np.array([-4.0]), np.array([4.0]), parameters=e,

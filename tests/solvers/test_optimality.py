@@ -34,7 +34,7 @@ FOUR = [0.0, 180.0, 180.0, 0.0]
 def four(
     objective: Measure = MEAN_MOUNT_FORCE, limits: tuple[Limit, ...] = (), upper: float = 0.02, tolerance: float = 1e-4
 ) -> Problem:
-    """The study's four-cylinder with two shafts at its front end, gas on."""
+    """Return the study's four-cylinder with two shafts at its front end, gas on."""
     rotors = [shaft_rotor("left", 2, 0.25, 0.1, -0.1), shaft_rotor("right", -2, 0.25, -0.1, -0.1)]
     machine = engine(FOUR, rotors, firing_order=[1, 3, 4, 2])
     terms = [Term(objective)]
@@ -42,7 +42,7 @@ def four(
 
 
 def value_at(p: Problem, u: np.ndarray) -> float:
-    """Objective of real columns by the exact model."""
+    """Return the objective of real columns by the exact model."""
     values = [complex(u[2 * k], u[2 * k + 1]) for k in range(len(p.decisions))]
     return objective_value(p, evaluate(p, p.design(values)))
 

@@ -14,7 +14,7 @@ Array = np.ndarray
 
 
 def moved(slope: Array, rows: list[Array], k: int, by: float) -> float:
-    """Least slope . x where no row of limit k is over `by`, and none of others over zero."""
+    """Return the least slope . x where no row of limit k is over `by`, and none of others over zero."""
     above = np.concatenate([np.full(len(own), by if k == j else 0.0) for j, own in enumerate(rows)])
     result = linprog(slope, A_ub=np.concatenate(rows), b_ub=above, bounds=[(None, None)] * len(slope))
     return {2: math.inf, 3: -math.inf}.get(result.status, result.fun)

@@ -86,7 +86,7 @@ weight = 2
 
 @pytest.fixture
 def closed(tmp_path: Path) -> Problem:
-    """Elastic mounts without anything open, and a transmissibility to be least."""
+    """Return the elastic mounts without anything open, and a transmissibility to be least."""
     mounts = changed(MOUNTS, (OPEN, '"400 N/mm"'), (OPEN, '"400 N/mm"'))
     objective = '[objective]\nminimise = "transmissibility"\noperating_points = ["idle"]\norders = [1]\n'
     yoke = changed(ENGINE, ("0.26", "0"), ("[0, 180, 180, 0]", "[0]"))

@@ -58,7 +58,7 @@ def module_name(path: Path) -> str:
 
 
 def room(module: str) -> str:
-    """Second part of a module's name: empty for the package itself."""
+    """Return the second part of a module's name: empty for the package itself."""
     return module.partition(".")[2].partition(".")[0]
 
 
@@ -71,7 +71,7 @@ def total_lines() -> int:
 
 
 def inside(node: ast.AST) -> Iterator[ast.AST]:
-    """Statements of a statement, with the arms of `try` and `match`; expressions hold neither functions nor imports."""
+    """Yield the statements of a statement, arms of `try` and `match` too; expressions hold no functions or imports."""
     for field in ("body", "orelse", "finalbody", "handlers", "cases"):
         result = getattr(node, field, None)
         if isinstance(result, list):
@@ -91,7 +91,7 @@ def functions(tree: ast.AST, prefix: str = "") -> Iterator[tuple[str, Function]]
 
 
 def imported(node: ast.AST, module: str, known: Trees) -> set[str]:
-    """Modules that an import statement names; a name that is no module counts as its package."""
+    """Return the modules that an import statement names; a name that is no module counts as its package."""
     if isinstance(node, ast.Import):
         return {alias.name for alias in node.names}
     if isinstance(node, ast.ImportFrom):
@@ -116,7 +116,7 @@ def statements(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def own_imports(known: Trees) -> dict[str, set[str]]:
-    """Modules of the project that each module imports when it runs, inside functions too."""
+    """Return the modules of the project that each module imports when it runs, inside functions too."""
     return {
         module: {name for node in run_nodes(tree) for name in imported(node, module, known) if name in known} - {module}
         for module, tree in known.items()
@@ -124,7 +124,7 @@ def own_imports(known: Trees) -> dict[str, set[str]]:
 
 
 def circles(graph: dict[str, set[str]]) -> list[set[str]]:
-    """Strongly connected sets of more than one module (Kosaraju)."""
+    """Return the strongly connected sets of more than one module (Kosaraju)."""
     order: list[str] = []
     seen: set[str] = set()
 
@@ -159,7 +159,7 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
 
 
 def loading(known: Trees) -> set[str]:
-    """Modules that load a heavy library when they are imported, by themselves or by what they import."""
+    """Return the modules that load a heavy library when they are imported, by themselves or by what they import."""
     top = {
         module: {name for node in tree.body for name in imported(node, module, known)} for module, tree in known.items()
     }
@@ -213,7 +213,7 @@ def operands(tree: ast.Module) -> tuple[ast.expr, ...]:
 
 
 def names_of(tree: ast.Module, home: str) -> set[str]:
-    """Names that a module has from `home`, or from what is below it, and the name of `home` itself."""
+    """Return the names that a module has from `home`, or from what is below it, and the name of `home` itself."""
     found: set[str] = set()
     for node in statements(tree):
         if isinstance(node, ast.ImportFrom):
@@ -224,7 +224,7 @@ def names_of(tree: ast.Module, home: str) -> set[str]:
 
 
 def questions_of(known: Trees, home: str) -> set[str]:
-    """Modules outside `home` that ask which of its objects they hold, with how often they ask."""
+    """Return the modules outside `home` that ask which of its objects they hold, with how often they ask."""
     found: dict[str, int] = {}
     for module, tree in known.items():
         names = names_of(tree, home)

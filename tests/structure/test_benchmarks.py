@@ -19,7 +19,7 @@ SHORT = {
 
 
 def ran(*words: str) -> subprocess.CompletedProcess[str]:
-    """Python with the package under test, wherever another one is installed."""
+    """Run Python with the package under test, wherever another one is installed."""
     source = str(Path(laufruhe.__file__).parents[1])
     tables = {**os.environ, "PYTHONPATH": os.pathsep.join([source, str(SCRIPTS)])}
     return subprocess.run([sys.executable, *words], cwd=SCRIPTS, env=tables, capture_output=True, text=True)

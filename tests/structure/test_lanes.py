@@ -19,7 +19,7 @@ OWN = f"{HERE}::test_a_run_lists_what_took_longer"
 
 @pytest.fixture
 def timer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A list of its own, and a run that says what tests took."""
+    """Return a timer with a list of its own, after a run with some times."""
     path = tmp_path / "a/slow.txt"
     path.parent.mkdir()
     path.write_text(f"# kept\n{OWN}[not run]\n{OWN}[now quick]\n{HERE}::test_that_went\ntests/gone.py::test_a\n")

@@ -66,7 +66,7 @@ def environment() -> dict[str, str]:
 def prepared(
     folder: Path, draws: int = 3000, chunk: int = 500, scenes: int = 60, few: int = 5, points: int = 9
 ) -> Path:
-    """The study and its problem, at so few samples that a solve takes milliseconds."""
+    """Return the study and its problem, at so few samples that a solve takes milliseconds."""
     folder.mkdir(parents=True, exist_ok=True)
     text = PROBLEM.read_text(encoding="utf-8") + "\n[fidelity]\nsamples = 144\n"
     (folder / "single.toml").write_text(text, encoding="utf-8")
@@ -90,7 +90,7 @@ class Cluster:
         return f"tcp://127.0.0.1:{self.port}"
 
     def start(self, count: int) -> None:
-        """A scheduler on its port, and workers."""
+        """Start a scheduler on its port, and workers."""
         self.port = self.port or _port()
         self.scheduler = self._process("scheduler", "--host", "127.0.0.1", "--port", str(self.port), *QUIET)
         for _ in range(count):
@@ -113,7 +113,7 @@ class Cluster:
         return sum(sum(psutil.Process(worker.pid).cpu_times()[:2]) for worker in self.workers)
 
     def kill(self) -> None:
-        """Everything, by SIGKILL."""
+        """Kill all processes by SIGKILL."""
         for process in (*self.workers, *([self.scheduler] if self.scheduler else [])):
             process.kill()
             process.wait()
@@ -130,7 +130,7 @@ class Cluster:
 
 
 def _port() -> int:
-    """Free, and of those that no system hands out unasked: it is taken later, and once more after a kill."""
+    """Return a free port outside those that a system hands out, so that a restart can take it again."""
     rng = random.SystemRandom()
     while True:
         with socket.socket() as one, suppress(OSError):
@@ -140,7 +140,7 @@ def _port() -> int:
 
 @contextmanager
 def cluster(folder: Path, count: int) -> Iterator[Cluster]:
-    """A cluster, and none left behind."""
+    """Yield a cluster, and kill it after the test."""
     folder.mkdir(parents=True, exist_ok=True)
     own = Cluster(folder)
     try:
@@ -152,7 +152,7 @@ def cluster(folder: Path, count: int) -> Iterator[Cluster]:
 
 
 def started(folder: Path, *words: str) -> subprocess.Popen[str]:
-    """The command in a process of its own."""
+    """Start the command in a new process."""
     return subprocess.Popen(
         [*LAUFRUHE, "study", "s.toml", "--out", "out", *words], cwd=folder, env=environment(),
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
@@ -161,7 +161,7 @@ def started(folder: Path, *words: str) -> subprocess.Popen[str]:
 
 
 def finished(folder: Path, *words: str) -> str:
-    """The command to its end; what it said, which is nothing where all went well."""
+    """Run the command to its end, and return its message, empty without an error."""
     process = started(folder, *words)
     said = process.communicate()[1]
     return said if process.returncode == 0 else f"{process.returncode}: {said}"
@@ -176,18 +176,18 @@ def results(folder: Path) -> dict[str, bytes]:
 
 
 def numbers(folder: Path) -> dict[str, bytes]:
-    """The arrays of the store, bit by bit."""
+    """Return the arrays of the store, bit by bit."""
     paths = sorted(draws_in(folder / "out").glob("*/*.npz"))
     return {f"{path.parent.name}/{path.name}": np.load(path)["values"].tobytes() for path in paths}
 
 
 def pieces_done(folder: Path) -> int:
-    """Pieces of draws that are kept."""
+    """Return the pieces of draws that are kept."""
     return len(list(draws_in(folder / "out").glob("*/*.npz")))
 
 
 def same(one: Path, other: Path) -> Sequence[str]:
-    """Names of results that differ."""
+    """Return the names of results that differ."""
     first, second = ({**results(each), **numbers(each)} for each in (one, other))
     differing = {name for name, data in first.items() ^ second.items()}
     return sorted(name for name in differing if not name.endswith(".nc") or not _same_data(one, other, name))
@@ -199,13 +199,13 @@ def _same_data(one: Path, other: Path, name: str) -> bool:
 
 
 def wait_until(done: object, seconds: float = 600.0) -> None:
-    """Until something holds, or for too long."""
+    """Wait until a condition holds, for a limited time."""
     until = time.monotonic() + seconds
     while not done() and time.monotonic() < until:  # type: ignore[operator]
         time.sleep(0.02)
 
 
 def moments(seed: int, count: int, seconds: float) -> list[float]:
-    """Random moments of a run, in order."""
+    """Return the random moments of a run, in order."""
     rng = random.Random(seed)
     return sorted(rng.uniform(0.0, seconds) for _ in range(count))

@@ -51,7 +51,7 @@ TIMED = "## Where the time went"
 
 
 def prepared(folder: Path) -> Path:
-    """The study and its problem, at so few samples that a point takes milliseconds."""
+    """Return the study and its problem, at so few samples that a point takes milliseconds."""
     folder.mkdir(parents=True, exist_ok=True)
     text = PROBLEM.read_text(encoding="utf-8") + "\n[fidelity]\nsamples = 144\n"
     (folder / "single.toml").write_text(text, encoding="utf-8")
@@ -60,7 +60,7 @@ def prepared(folder: Path) -> Path:
 
 
 def started(folder: Path, jobs: int = 1) -> subprocess.Popen[str]:
-    """The command in a process of its own; with several jobs, workers are started at once."""
+    """Start the command in a new process; several jobs start workers at once."""
     source = str(Path(laufruhe.__file__).parents[1])
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     # a test run in the background has its interrupts ignored, and hands that on
@@ -81,7 +81,7 @@ def results(folder: Path) -> dict[str, bytes]:
 
 
 def damage(path: Path, rng: random.Random) -> str:
-    """Something wrong with the kept points; says what."""
+    """Damage the kept points, and return what was done."""
     if not path.is_file() or not path.stat().st_size:
         return "nothing was kept"
     data = path.read_bytes()
@@ -161,7 +161,7 @@ def attacked(folder: Path, seed: int, whole: Whole, log: Log) -> None:
 
 
 def stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole: Whole, seed: int, log: Log) -> None:
-    """Each by a signal of its own, at a moment of its own: mostly while points are kept or files are written."""
+    """Stop each process by a random signal at a random moment, mostly while it writes."""
     began, slower = time.monotonic(), len(running) ** 0.3
     moments = []
     for process in running:

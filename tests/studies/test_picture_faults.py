@@ -15,7 +15,7 @@ from picture_faults import faults_of
 
 
 def cases(names: list[str]) -> Picture:
-    """Bars as a comparison of layouts draws them."""
+    """Return the bars as a comparison of layouts draws them."""
     count = len(names)
     data = xr.Dataset(
         {

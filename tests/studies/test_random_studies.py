@@ -36,12 +36,12 @@ NUMBER = re.compile(r"^(-?[\d.]+)(?:/(\d+))? ([^±]+)$")
 
 
 def scene(name: str) -> dict[str, Any]:
-    """A ready problem at few samples."""
+    """Return a ready problem at few samples."""
     return {**PROBLEMS[name], "fidelity": {"samples": 144}, "search": {"starts": 1}}
 
 
 def put(tables: dict[str, Any], path: str, value: Any) -> None:
-    """A value at a path, by hand."""
+    """Put a value at a path."""
     here: Any = tables
     *before, last = path.split(".")
     for key in before:
@@ -66,7 +66,7 @@ def sweeps_of(tables: dict[str, Any]) -> dict[str, Any]:
 
 
 def swept(rng: random.Random, path: str, value: str) -> dict[str, Any]:
-    """Two or three values about the one that the file has; limits are loosened only."""
+    """Return the two or three values about the one that the file has; limits are loosened only."""
     match = NUMBER.match(value)
     assert match is not None
     middle, unit = float(match[1]) / float(match[2] or 1), match[3]
@@ -101,7 +101,7 @@ def fits(kind: str, tables: dict[str, Any]) -> bool:
 
 
 def drawn(rng: random.Random, folder: Path) -> dict[str, Any]:
-    """A random study of one part, its problems beside it."""
+    """Return a random study of one part, with its problems in the folder."""
     kind = rng.choice(KINDS)
     names = [name for name in PROBLEMS if "objective" in PROBLEMS[name] and fits(kind, PROBLEMS[name])]
     chosen = [rng.choice(names)]

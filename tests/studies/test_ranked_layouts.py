@@ -53,7 +53,7 @@ def test_an_open_crank_is_decided_in_its_new_size() -> None:
 
 @pytest.fixture(scope="module")
 def data() -> xr.Dataset:
-    """Three engines of the ready study."""
+    """Return the three engines of the ready study."""
     part_table = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
     layouts = ("in line 6", "boxer 2", "radial 3")
     part_table["cases"] = [case for case in part_table["cases"] if case["name"] in layouts]

@@ -46,7 +46,7 @@ FRACTION = "counterweights.web.balance_factor"
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the single-cylinder at few samples, so that a point takes milliseconds."""
+    """Return a folder with the single-cylinder at few samples, so that a point takes milliseconds."""
     folder = tmp_path_factory.mktemp("small")
     text = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
     (folder / "single.toml").write_text(text + "\n[fidelity]\nsamples = 144\n", encoding="utf-8")
@@ -73,7 +73,7 @@ def computed(path: Path, folder: Path = PROBLEMS, jobs: int = 1, points_file: Pa
 
 
 def points_in(content: bytes) -> set[str]:
-    """Marks and records of lines that are whole; times differ."""
+    """Return the marks and records of lines that are whole; times differ."""
     found = [line.partition(b" ")[2] for line in content.splitlines()]
     return {str(json.loads(line)[::2]) for line in found if line.endswith(b"}]")}
 
@@ -346,7 +346,7 @@ LONG = part("counterweight fraction", ["single"], SPEEDS.format(25))
 
 @pytest.fixture(scope="module")
 def whole(small: Path, tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    """A long study that nothing stopped."""
+    """Return an uninterrupted long study."""
     return computed(study(tmp_path_factory.mktemp("whole"), LONG), small)
 
 

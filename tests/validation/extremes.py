@@ -190,7 +190,7 @@ def cylinder_numbers() -> Entry:
 
 
 def _even_order(count: int) -> list[int]:
-    """Throws in a mixed order, each once."""
+    """Return the throws in a mixed order."""
     step = max(1, count // 2 - 1)
     return [(k * step) % count if math.gcd(step, count) == 1 else k for k in range(count)]
 
@@ -292,7 +292,7 @@ _BOUNDS = ((1.0, 1e-2), (1e2, 1e-3), (1e3, 1e-6), (1e4, 1e-9), (1e6, 1e-6), (1e8
 
 @lru_cache
 def _bounded(big: float, small: float) -> tuple[float, float]:
-    """Error of the unbalances of a free shaft and a bounded one; by how much the true gap exceeds the stated one."""
+    """Return error of free and bounded unbalances of a shaft, and the excess of the true gap over the stated one."""
     rotors = [tractor.shaft_rotor("plus", 2.0, 0.0), tractor.shaft_rotor("minus", -2.0, 0.0)]
     machine = replace(tractor.engine([0, 180, 180, 0], rotors), mounts=())
     force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
@@ -361,7 +361,7 @@ _BOUNCE = math.sqrt(4.0 * _SPRING / _MASS)
 
 
 def _bounce_force(speed: float, direction: int = 2) -> complex:
-    """Force on the first of four mounts under a unit force of first order through the centre of gravity."""
+    """Return the force on the first of four mounts under a unit force of first order through the centre of gravity."""
     mounts = tuple(
         Mount(f"m{k}", (x, y, 0.0), (0.4 * _SPRING, 0.4 * _SPRING, _SPRING))
         for k, (x, y) in enumerate([(0.4, 0.3), (0.4, -0.3), (-0.4, 0.3), (-0.4, -0.3)])
@@ -399,7 +399,7 @@ ENTRIES: tuple[Callable[[], Entry], ...] = (
 
 
 def page() -> str:
-    """The table."""
+    """Return the table."""
     lines = [
         "# Numbers at the extremes",
         "",

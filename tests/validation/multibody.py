@@ -240,7 +240,7 @@ class _Model:
 def simulate(
     machine: Machine, steps: int, turns: int = 1, run_in: int = RUN_IN, integrator: Integrator = ACCURATE
 ) -> Loads:
-    """Loads on the block at equal steps over some turns, from phi = 0.
+    """Return the loads on the block at equal steps over some turns, from phi = 0.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def simulate(
 
 
 def build(machine: Machine, start: float) -> _Model:
-    """The exudyn system at crank angle `start`, turning, with positions and velocities that fit."""
+    """Return the exudyn system at crank angle `start`, turning, with positions and velocities that fit."""
     model = _Model(exu.SystemContainer().AddSystem(), machine, start)
     model.ground = model.system.AddObject(ObjectGround())
     model.origin = _coordinate(model, model.system.AddNode(NodePointGround()), 0)
@@ -306,7 +306,7 @@ def integrate(model: _Model, steps: int, count: int, integrator: Integrator = AC
 
 
 def _add_turning(model: _Model, part: Turning) -> _Body:
-    """A body in a bearing, driven at constant speed."""
+    """Return a body in a bearing, driven at constant speed."""
     angle, rate = part.ratio * model.start, part.ratio * model.machine.speed
     arm = part.centre * cmath.exp(1j * angle)
     body = _add_body(model, part.x, part.mass, part.inertia, _Motion(part.axis + arm, angle, 1j * rate * arm, rate))
@@ -327,7 +327,7 @@ def _add_turning(model: _Model, part: Turning) -> _Body:
 
 
 def _add_cylinder(model: _Model, cylinder: Cylinder, throw: _Body) -> None:
-    """Rod and piston, the piston held by its wall and pressed by the gas."""
+    """Add the rod and piston, guided by the wall and pressed by the gas."""
     turning, rod = model.machine.turning[cylinder.throw], cylinder.rod
     at_rod, at_piston = _cylinder_motion(cylinder, turning, model.start, model.machine.speed)
     swinging = _add_body(model, turning.x, rod.mass, rod.inertia, at_rod)
@@ -364,7 +364,7 @@ def _add_gas(model: _Model, gas: Callable[[float], float], axis: complex, piston
 
 
 def _cylinder_motion(cylinder: Cylinder, throw: Turning, start: float, speed: float) -> tuple[_Motion, _Motion]:
-    """Rod and piston that fit the throw: where a circle about the pin meets the pin's path, and equal velocities."""
+    """Return the motions of rod and piston from the intersection of a circle about the pin with its path."""
     rate, axis, rod = throw.ratio * speed, cmath.exp(1j * cylinder.bank), cylinder.rod
     arm = cylinder.pin * cmath.exp(1j * throw.ratio * start)
     local = arm / axis - 1j * cylinder.offset
@@ -397,7 +397,7 @@ def _add_body(model: _Model, x: float, mass: float, inertia: float, motion: _Mot
 
 
 def _marker(model: _Model, body: int, place: complex, angle: float = 0.0) -> int:
-    """A place on a body, with a frame at an angle to that of the body."""
+    """Return a place on a body, with a frame at an angle to that of the body."""
     c, s = math.cos(angle), math.sin(angle)
     frame = np.array([[c, -s, 0.0, place.real], [s, c, 0.0, place.imag], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
     return int(model.system.AddMarker(MarkerBodyRigid(bodyNumber=body, localHT=frame)))
@@ -420,7 +420,7 @@ def _sensor(model: _Model, kind: Callable[..., Any], number: int, what: Any) -> 
 
 
 def _reactions(model: _Model, torques: list[tuple[float, FloatArray]], steps: slice) -> FloatArray:
-    """Forces of bearings and walls on the block, and what gears add.
+    """Return the forces of bearings and walls on the block, with those of gears.
 
     A drive holds its body at speed from outside the block. That is the flywheel's work for the crank; a shaft of ratio
     n has its torque from the crank by gears, which take n times as much from it, and the block bears the difference.
@@ -445,7 +445,7 @@ def _momentum(model: _Model, torques: list[tuple[float, FloatArray]], steps: sli
 
 
 def _gas_wrench(machine: Machine, angles: FloatArray) -> FloatArray:
-    """The gas on the cylinder heads."""
+    """Return the wrench of the gas on the cylinder heads."""
     total = np.zeros((len(angles), 6))
     for cylinder in machine.cylinders:
         if cylinder.gas is not None:
@@ -456,7 +456,7 @@ def _gas_wrench(machine: Machine, angles: FloatArray) -> FloatArray:
 
 
 def _wrench(x: float, place: complex | ComplexArray, force: ComplexArray) -> FloatArray:
-    """Wrench of forces z + i y at places z + i y in the plane at x, shape (n, 6): r x F."""
+    """Return the wrench of forces z + i y at places z + i y in the plane at x, shape (n, 6): r x F."""
     lateral, vertical, arm = force.imag, force.real, np.asarray(place)
     roll = arm.imag * vertical - arm.real * lateral
     return np.stack([np.zeros(len(force)), lateral, vertical, roll, -x * vertical, x * lateral], axis=1)

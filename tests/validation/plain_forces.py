@@ -54,16 +54,16 @@ class PlainEngine:
     maps: FloatArray
 
     def forces(self, rod_ratio: float, speed: float) -> FloatArray:
-        """Mount forces with all numbers computed, shape (samples, mounts, 3) [N]."""
+        """Return the mount forces with all numbers computed, shape (samples, mounts, 3) [N]."""
         return self.on_mounts(speed**2 * self._inertia(rod_ratio) + self._gas(rod_ratio) + self.turning(speed))
 
     def truncated(self, rod_ratio: float) -> Callable[[float], FloatArray]:
-        """Mount forces as a function of speed that keeps inertia, gas and unbalances at unit speed."""
+        """Return the mount forces as a function of speed that keeps inertia, gas and unbalances at unit speed."""
         at_unit_speed, gas = self._inertia(rod_ratio) + self.turning(1.0), self._gas(rod_ratio)
         return lambda speed: self.on_mounts(speed**2 * at_unit_speed + gas)
 
     def on_mounts(self, wrench: FloatArray) -> FloatArray:
-        """Forces on the mounts from wrenches, shape (samples, mounts, 3) [N]."""
+        """Return the forces on the mounts from wrenches, shape (samples, mounts, 3) [N]."""
         return (wrench @ self.maps.T).reshape(len(wrench), -1, 3)
 
     def _inertia(self, rod_ratio: float) -> FloatArray:
@@ -95,7 +95,7 @@ class PlainEngine:
         return wrench
 
     def turning(self, speed: float) -> FloatArray:
-        """Wrench of the rotors, shape (samples, 6) [N, N m]."""
+        """Return the wrench of the rotors, shape (samples, 6) [N, N m]."""
         wrench = np.zeros((len(self.phi), 6))
         for x, unbalance, ratio, y, z in self.rotors:
             force = unbalance * (ratio * speed) ** 2 * np.exp(1j * ratio * self.phi)
@@ -108,7 +108,7 @@ class PlainEngine:
 
 
 def plain_engine(engine: Engine, point: OperatingPoint, samples: int) -> PlainEngine:
-    """The numbers of an upright in-line engine with equal cylinders on rigid mounts."""
+    """Return the numbers of an upright in-line engine with equal cylinders on rigid mounts."""
     parts, gas = engine.slider_cranks, point.gas
     assert gas is None or isinstance(gas, Seiliger)
     phi = CYCLE * np.arange(samples) / samples

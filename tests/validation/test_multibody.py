@@ -60,7 +60,7 @@ class Case:
 
 
 def described(machine: Machine, *, pressure: PressureTrace | None = None, parts: tuple[Rotor, ...] = ()) -> Case:
-    """A machine with its engine, each throw and rod in the engine's own terms.
+    """Return a machine with its engine, each throw and rod in the engine's own terms.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def pin_at(degrees: float) -> complex:
 
 
 def inline(*throws: float, spacing: float = 0.1) -> Machine:
-    """Cylinders in line, front first (C2, C3)."""
+    """Return the cylinders in line, front first (C2, C3)."""
     middle = 0.5 * (len(throws) - 1)
     bodies = tuple(Turning((middle - k) * spacing, mass=4.0) for k in range(len(throws)))
     cylinders = tuple(Cylinder(k, pin_at(angle), ROD, PISTON) for k, angle in enumerate(throws))
@@ -128,7 +128,7 @@ def single() -> Case:
 
 
 def single_with_counterweight() -> Case:
-    """Web, pin and counterweight are one rigid body here, two unbalances there."""
+    """Return a single whose web, pin and counterweight are one rigid body here, two unbalances there."""
     pin, weight = 0.8 * RADIUS, 3.0 * 0.07 * cmath.exp(1j * math.radians(170.0))
     throw = Turning(0.0, mass=6.0, centre=(pin + weight) / 6.0)
     parts = (Rotor("pin", 0.0, pin, role=Role.THROW), Rotor("counterweight", 0.0, weight))
@@ -144,7 +144,7 @@ def four_cylinder() -> Case:
 
 
 def uneven_four_with_counterweights() -> Case:
-    """Nothing cancels: every throw is heavy elsewhere."""
+    """Return an uneven four in which no load cancels."""
     machine = inline(0.0, 100.0, 170.0, 290.0)
     heavy = tuple(
         replace(body, centre=0.01 * cmath.exp(1j * (2.0 + 0.7 * k))) for k, body in enumerate(machine.turning)
@@ -153,7 +153,7 @@ def uneven_four_with_counterweights() -> Case:
 
 
 def vee_twin() -> Case:
-    """Two rods on one pin, 90 degrees between the banks, away from the middle."""
+    """Return a twin with two rods on one pin and 90 degrees between the banks, away from the middle."""
     banks = (math.radians(45.0), math.radians(-45.0))
     throw = Turning(0.06, mass=5.0, centre=-0.02 * cmath.exp(1j * banks[0]))
     cylinders = tuple(Cylinder(0, pin_at(45.0), ROD, PISTON, bank=bank) for bank in banks)
@@ -166,7 +166,7 @@ def offset_crank(offset: float) -> Case:
 
 
 def balancer_pair() -> Case:
-    """Shafts at twice the crank's speed, both ways round, off the axis and at unequal heights."""
+    """Return two shafts at twice the crank's speed, both ways round, off the axis and at unequal heights."""
     machine = inline(0.0, 180.0, 180.0, 0.0)
     left = Turning(0.05, 0.8, 0.030 * cmath.exp(0.4j), ratio=2.0, axis=-0.06 + 0.10j)
     right = Turning(-0.03, 0.7, 0.030 * cmath.exp(2.4j), ratio=-2.0, axis=0.14 - 0.09j)
@@ -174,7 +174,7 @@ def balancer_pair() -> Case:
 
 
 def geared_twin_crank() -> Case:
-    """Two cranks that run against each other, the second with its flywheel torque through the gears."""
+    """Return the two cranks that run against each other, the second with its flywheel torque through the gears."""
     turning = (Turning(0.0, 4.0, axis=0.08j), Turning(0.0, 4.0, ratio=-1.0, axis=-0.08j))
     cylinders = (
         Cylinder(0, pin_at(0.0), ROD, PISTON, offset=-0.01),
@@ -184,12 +184,12 @@ def geared_twin_crank() -> Case:
 
 
 def gas_force(firing: float, angle: float) -> float:
-    """A pressure stroke every second turn, with half orders, over the crank angle [N]."""
+    """Return a force with a pressure stroke every second turn and half orders, over the crank angle [N]."""
     return 2.0e4 * math.exp(20.0 * (math.cos(0.5 * (angle - firing) - 0.12) - 1.0))
 
 
 def trace() -> PressureTrace:
-    """The gas force as a pressure, with a point wherever the loads are sampled."""
+    """Return the gas force as a pressure, with a point wherever the loads are sampled."""
     angles = 2.0 * math.tau * np.arange(TRACE_POINTS) / TRACE_POINTS
     area = 0.25 * math.pi * BORE**2
     pressures = tuple(CRANKCASE + gas_force(0.0, angle) / area for angle in angles)
@@ -197,7 +197,7 @@ def trace() -> PressureTrace:
 
 
 def fired(case: Case) -> Case:
-    """The case with gas in its cylinders."""
+    """Return the case with gas in its cylinders."""
     pairs = zip(case.machine.cylinders, case.engine.slider_cranks, strict=True)
     cylinders = tuple(replace(part, gas=partial(gas_force, crank.firing_angle)) for part, crank in pairs)
     return described(replace(case.machine, cylinders=cylinders), pressure=trace(), parts=case.engine.rotors)
@@ -242,7 +242,7 @@ def analytic(case: Case, steps: int) -> FloatArray:
 
 @cache
 def unit_loads(name: str) -> FloatArray:
-    """The wrench that errors are counted in."""
+    """Return the wrench that errors are counted in."""
     machine = case_of(name).machine
     throws = [(abs(part.pin), machine.turning[part.throw]) for part in machine.cylinders]
     pistons = [(PISTON + ROD.mass) * radius for radius, _ in throws]
@@ -302,7 +302,7 @@ def test_rod_of_two_masses_gets_the_roll_moment_wrong(name: str, share: float) -
 
 
 def in_bearings(case: Case, steps: int) -> NDArray[np.complex128]:
-    """Force of every turning body on its bearing, z + i y: the shaft held on both sides of each throw."""
+    """Return the force of every turning body on its bearing, z + i y: the shaft held on both sides of each throw."""
     forces = []
     angles = math.tau * np.arange(case.turns * steps) / steps
     for k, body in enumerate(case.machine.turning):

@@ -79,7 +79,7 @@ class Star:
     lengths: list[float]
 
     def places(self, phi: Any) -> tuple[Any, list[Any], list[Any]]:
-        """Crank pin, lower ends of the rods and piston pins."""
+        """Return the crank pin, lower ends of the rods and piston pins."""
         pin = RADIUS * mp.expj(phi + self.banks[0])
         lower, upper = [pin], [_on_axis(pin, LENGTH, self.banks[0])]
         line = (upper[0] - pin) / LENGTH
@@ -89,13 +89,13 @@ class Star:
         return pin, lower, upper
 
     def on_the_block(self, phi: float, gas: dict[int, float] | None = None, massless: bool = False) -> tuple[Any, Any]:
-        """Force and roll moment by Newton and Euler at every body, the crank turning evenly."""
+        """Return the force and roll moment by Newton and Euler at every body, the crank turning evenly."""
         return self.solved(phi, gas, massless)[:2]
 
     def solved(
         self, phi: float, gas: dict[int, float] | None = None, massless: bool = False
     ) -> tuple[Any, Any, list[complex], list[float]]:
-        """The same; what every rod presses its lower pin with, and every piston its wall."""
+        """Return force, roll moment, forces of every rod on its lower pin, and of every piston on its wall."""
         weight = 0.0 if massless else 1.0
         _, lower, upper = self.places(mp.mpf(phi))
         force, roll = 0j, 0.0

@@ -35,7 +35,7 @@ def number(text: str | float) -> float:
 
 
 def integral(low: float, high: float, f: Callable[[float], float]) -> float:
-    """Simpson's rule, exact for cubics."""
+    """Return the integral by Simpson's rule, exact for cubics."""
     return (high - low) / 6.0 * (f(low) + 4.0 * f(0.5 * (low + high)) + f(high))
 
 
@@ -51,20 +51,20 @@ def change(job: Tables, radius: float, diameter: float, depth: float, fill: floa
 
 
 def edge_distance(angle: float, radius: float, edge: float) -> float:
-    """Distance of a place from the ray of an edge."""
+    """Return the distance of a place from the ray of an edge."""
     place, far = cmath.rect(radius, math.radians(angle)), cmath.rect(1e6, math.radians(edge))
     return point_distance(place, 0.0, far)
 
 
 def point_distance(point: complex, start: complex, end: complex) -> float:
-    """Distance of a point from the line between two points."""
+    """Return the distance of a point from the line between two points."""
     way = end - start
     share = 0.0 if way == 0.0 else ((point - start) * way.conjugate()).real / abs(way) ** 2
     return abs(point - start - min(max(share, 0.0), 1.0) * way)
 
 
 def axis_distance(one: PlainHole, other: PlainHole, radius: float) -> float:
-    """Distance of the axes of two holes in the plane; they do not cross, so it is that of an end of one of them."""
+    """Return the distance of the axes of two holes in the plane, which do not cross, from an end of one of them."""
     axes = [[cmath.rect(r, math.radians(hole.angle)) for r in (radius, hole.end)] for hole in (one, other)]
     return min(point_distance(end, *axis) for axis, points in (axes, axes[::-1]) for end in points)
 
@@ -74,7 +74,7 @@ def is_inside(angle: float, sector: list[float]) -> bool:
 
 
 def end_depth(job: Tables, diameter: float, depth: float) -> float:
-    """Depth of the centre of a ball of the hole's diameter that covers its end, with the drill's point."""
+    """Return the depth of the centre of a ball of the hole's diameter that covers its end, with the drill's point."""
     slender = diameter / 2.0 / math.tan(math.radians(job.get("point_angle", 180) / 2.0)) - diameter / 2.0
     return depth + max(slender, 0.0)
 
@@ -108,7 +108,7 @@ def holes_of(job: Tables, plane: Tables) -> Iterator[list[PlainHole]]:
 
 
 def residuals(job: Tables, plane: Tables, max_holes: int) -> tuple[complex, list[float]]:
-    """Initial unbalance [g mm], and the least residual with 0, 1, 2 ... holes; infinite if there is no design."""
+    """Return the initial unbalance [g mm] and the least residual with 0, 1, 2 ... holes, infinite without a design."""
     measured = plane["measured"]
     size = (
         number(measured["unbalance"]) if "unbalance" in measured
@@ -136,7 +136,7 @@ def residuals(job: Tables, plane: Tables, max_holes: int) -> tuple[complex, list
 
 
 def random_file(seed: int, max_holes: int = 3) -> Tables:
-    """Tables of a random correction that brute force can solve."""
+    """Return the tables of a random correction that brute force can solve."""
     draw = random.Random(seed)
     radial = draw.random() < 0.5
     job: Tables = {

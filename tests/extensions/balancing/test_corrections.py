@@ -121,7 +121,7 @@ def test_a_larger_max_depth_never_leaves_more(seed: int) -> None:
 
 
 def cheek(direction: str, unbalance: str) -> Tables:
-    """A crank cheek of 62 mm, its heavy spot 5 deg beside the solid sector of the pin."""
+    """Return a crank cheek of 62 mm, its heavy spot 5 deg beside the solid sector of the pin."""
     return {
         "title": "Cheek",
         "correction": {

@@ -31,7 +31,7 @@ def numbers(path: Path) -> dict[tuple[str, str], list[str]]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a decided design, its saved result, and a design of other numbers."""
+    """Return a folder with a decided design, its saved result, and a design of other numbers."""
     place = tmp_path_factory.mktemp("designs")
     assert FIXED != SINGLE
     (place / "open.toml").write_text(SINGLE, encoding="utf-8")

@@ -34,7 +34,7 @@ AT = OperatingPoint("run", SPEED)
 def rocker(
     side: int = 1, bank: float = 0.0, throw: float = 0.0, shaft: Shaft = CRANKSHAFT, **numbers: Any
 ) -> CrankRocker:
-    """A linkage without symmetry."""
+    """Return a linkage without symmetry."""
     linkage: dict[str, Any] = {
         "crank_radius": 0.11, "pivot": complex(-0.5, 0.42), "coupler_length": 0.55, "arm": 0.4, "side": side,
         "end": cmath.rect(0.35, 2.6 * side), "piston_rod_length": 0.6, "piston_offset": 0.7 if side > 0 else 0.3,
@@ -49,7 +49,7 @@ def rocker(
 
 
 def circles(first: np.ndarray, radius: float, other: Any, reach: float, side: int) -> np.ndarray:
-    """The point at these distances from two centres, to the left (1) or right (-1) of the line between them."""
+    """Return the point at these distances from two centres, to the left (1) or right (-1) of the line between them."""
     line = other - first
     distance = np.abs(line)
     angle = np.arccos((radius**2 + distance**2 - reach**2) / (2.0 * radius * distance))

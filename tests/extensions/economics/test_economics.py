@@ -99,7 +99,7 @@ def four() -> xr.Dataset:
 
 
 def _four(mass: str, alternating: bool = False) -> xr.Dataset:
-    """The study counts the static part of mount forces too."""
+    """Return the study with the static part of mount forces."""
     builds = [
         {"name": "force pair", "shafts": ["force left", "force right"]},
         {"name": "moment pair", "shafts": ["moment left", "moment right"]},

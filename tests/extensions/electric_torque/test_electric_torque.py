@@ -59,7 +59,7 @@ def problem_of(machines: list[dict[str, Any]], minimise: str | None = "rms roll 
 
 
 def decided(result: Result) -> tuple[complex, ...]:
-    """Torque of every harmonic of the first machine of the final design."""
+    """Return the torque of every harmonic of the first machine of the final design."""
     extra = result.final.engine.extra(ElectricMachines)
     assert extra is not None
     return tuple(complex(one.torque) for one in extra.machines[0].harmonics)

@@ -42,7 +42,7 @@ def elastic() -> laufruhe.Result:
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """A file of the loads on elastic mounts in a format."""
+    """Return a file of the loads on elastic mounts in a format."""
     folder = tmp_path_factory.mktemp("exported")
 
     def file(to: str) -> Path:

@@ -133,7 +133,7 @@ def test_trade_where_a_star_is_open(tmp_path: Path) -> None:
 
 
 def _elastic_with_a_shaft() -> str:
-    """The tractor on elastic mounts as they are given, its shafts open, at idle."""
+    """Return the text of the tractor on given elastic mounts at idle, with open shafts."""
     text = (PROBLEMS / "tractor-four-elastic.toml").read_text(encoding="utf-8")
     text = re.sub(r"\{ between = [^}]*start = (\"[^\"]*\") \}", r"\1", text)
     text = text.replace("turned    = [{ between = [0, 60] }, 0, 0]", "turned    = [0, 0, 0]")

@@ -91,7 +91,7 @@ def test_automatic_on_random_engines(seed: int) -> None:
 
 
 def _keeps_its_word(problem: Problem, tolerance: float) -> None:
-    """The choice is within what it says, and each part put back changes less than said."""
+    """Check that the error of the choice is as stated, and that each part put back changes less than stated."""
     choice = choose(problem, tolerance)
     own = replace(problem, fidelity=choice.fidelity)
     value = objective_value(own, evaluate(own))

@@ -35,7 +35,7 @@ def _fidelity(rng: random.Random) -> Fidelity:
 
 
 def _errors(seed: int) -> tuple[float, float]:
-    """True error and stated error of a fidelity, relative to its objective."""
+    """Return the true error and stated error of a fidelity, relative to its objective."""
     rng = random.Random(seed)
     problem = random_problem(rng)
     own = replace(problem, fidelity=_fidelity(rng))
@@ -55,7 +55,7 @@ def test_estimate_is_not_below_the_error(first: int, count: int) -> None:
 
 
 def _scene(make, seed: int) -> Problem:
-    """Rigid or elastic, even or uneven throws, rows and vees, two- and four-stroke, always with gas."""
+    """Return a random problem with gas: rigid or elastic mounts, even or uneven throws, rows and vees."""
     return make(random.Random(40_000 + seed), gas=True)
 
 

@@ -38,7 +38,7 @@ class Lists:
 
     @property
     def csv(self) -> str:
-        """Text of the CSV file."""
+        """Return the text of the CSV file."""
         heads = [f"{name} [{unit}]" if unit else name for name, unit, _ in self.columns]
         lines = [", ".join(["name", *heads])]
         lines += [", ".join([f"{self.name} {k}", *map(repr, row)]) for k, row in enumerate(self.rows, 1)]

@@ -27,7 +27,7 @@ DERIVATIVES = {"m/s^2": 2, "m/s": 1}
 
 
 def weight(name: str, f: np.ndarray) -> np.ndarray:
-    """Factor of a weighting at frequencies above zero, from its formula."""
+    """Return the factor of a weighting at frequencies above zero, from its formula."""
     if name == "none":
         return np.ones(f.shape)
     s = 2j * math.pi * f

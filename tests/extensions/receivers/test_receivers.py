@@ -34,7 +34,7 @@ def written(table: dict[str, Any], folder: Path) -> Path:
 
 
 def measured(path: Path, design: Any) -> float:
-    """Value of the objective of a file for a design, by the own evaluation."""
+    """Return the value of the objective of a file for a design, by the own evaluation."""
     model = PlainReceivers(path)
     norm, _, quantity = model.table["objective"]["minimise"].partition(" receiver ")
     return model.value(design, model.table["objective"], norm, UNITS[quantity])
@@ -142,7 +142,7 @@ def test_open_mounts_give_a_local_optimum_without_a_bound(tmp_path: Path) -> Non
 
 
 def plain(folder: Path) -> dict[str, Any]:
-    """Single with a point on its block, one with transfer functions, and a frame."""
+    """Return a single with a point on its block, one with transfer functions, and a frame."""
     functions(np.random.default_rng(0), 3, folder / "f.csv")
     places = [["200 mm", "100 mm", "0 mm"], ["200 mm", "-100 mm", "0 mm"], ["-200 mm", "0 mm", "0 mm"]]
     return {

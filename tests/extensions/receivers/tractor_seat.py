@@ -28,7 +28,7 @@ MEASURED = np.concatenate([np.arange(2.0, 20.0, 0.5), np.arange(20.0, 101.0, 2.0
 
 
 def seat(f: float) -> float | complex:
-    """Acceleration of the driver over that of the hull under the seat."""
+    """Return the acceleration of the driver over that of the hull under the seat."""
     r = f / FREQUENCY
     return (1.0 + 2j * DAMPING * r) / (1.0 - r**2 + 2j * DAMPING * r)
 

@@ -23,7 +23,7 @@ def skew(v: np.ndarray) -> np.ndarray:
 
 
 def arm(place: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Motion of a point per translation and rotation of its body."""
+    """Return the motion of a point per translation and rotation of its body."""
     return np.hstack([np.eye(3), -skew(np.asarray(place) - np.asarray(centre))])
 
 
@@ -47,7 +47,7 @@ class Answer:
 
 
 def answer(engine: Engine, frame: Frame, load: np.ndarray, on_frame: np.ndarray, w: float) -> Answer:
-    """Motion of both centres and mount forces under a load at the engine's centre and forces at the frame's feet."""
+    """Return the motion of both centres and mount forces under a load on the engine and forces at the frame's feet."""
     assert engine.block is not None
     centres = engine.block.centre_of_gravity, frame.body.centre_of_gravity
     z = np.zeros((12, 12), dtype=complex)
@@ -94,7 +94,7 @@ def scene(seed: int) -> tuple[Engine, Frame]:
 
 
 def wrenches(seed: int, orders: int = 6) -> np.ndarray:
-    """Random loads about the origin in orders 0, 1/2, 1 ..., shape (orders, 6)."""
+    """Return the random loads about the origin in orders 0, 1/2, 1 ..., shape (orders, 6)."""
     rng = np.random.default_rng(1000 + seed)
     loads = rng.normal(size=(orders, 6)) + 1j * rng.normal(size=(orders, 6))
     loads[0] = loads[0].real
@@ -106,12 +106,12 @@ def at_centre(load: np.ndarray, centre: tuple[float, float, float]) -> np.ndarra
 
 
 def response(engine: Engine, receivers: Receivers, loads: np.ndarray) -> np.ndarray:
-    """Acceleration of the receivers by the channel, shape (orders, receivers, 3)."""
+    """Return the acceleration of the receivers by the channel, shape (orders, receivers, 3)."""
     return response_at(engine, receivers, loads, SPEED / 2.0)
 
 
 def response_at(engine: Engine, receivers: Receivers, loads: np.ndarray, w: float) -> np.ndarray:
-    """Acceleration under loads at multiples of an angular frequency [rad/s]."""
+    """Return the acceleration under loads at multiples of an angular frequency [rad/s]."""
     point = OperatingPoint("p", w)
     loaded = PointLoads(point, Spectrum(Fraction(1), loads), None, moving_parts=engine.with_extra(receivers))
     return ACCELERATION.signal(loaded).coefficients

@@ -31,7 +31,7 @@ def parts_of(file: str) -> dict[str, Replication]:
 
 
 def shared_part(file: str, name: str) -> Path:
-    """Folder of the finished points of one part, and its dataset, which one process of the tests has computed."""
+    """Return the folder of the finished points of one part and its dataset, computed once for all processes."""
 
     def fill(folder: Path) -> None:
         study = study_of(file)
@@ -50,7 +50,7 @@ def computed(file: str, name: str) -> xr.Dataset:
 
 @pytest.fixture(scope="session")
 def figure() -> Callable[[str], xr.Dataset]:
-    """Dataset of a figure of the tractor study."""
+    """Return the dataset of a figure of the tractor study."""
     return lambda name: computed("tractor-study", name)
 
 

@@ -28,7 +28,7 @@ PROBLEM = PROBLEMS / "rhombic-stirling.toml"
 
 def halves(power: float, displacer: float, deficit: float = 0.0, radius: float = 0.024, rod: float = 0.08,
            offset: float = 0.045, turning: float = 0.3) -> tuple[RhombicHalf, RhombicHalf]:  # fmt: skip
-    """Two cranks at both sides of the cylinder, with half of each mass."""
+    """Return the two cranks at both sides of the cylinder, with half of each mass."""
     second = Shaft("second crank", -1.0, 2.0 * offset, 0.0)
     first, other = (
         RhombicHalf(
@@ -41,7 +41,7 @@ def halves(power: float, displacer: float, deficit: float = 0.0, radius: float =
 
 
 def places(part: RhombicHalf) -> list[moving.Mass]:
-    """Masses of one crank; rods are rhombus sides, without inertia of their own."""
+    """Return the masses of one crank; rods are rhombus sides, without inertia of their own."""
     centre, alpha = part.shaft.z + 1j * part.shaft.y, part.shaft.ratio * moving.angles()
     pin = part.crank_radius * np.exp(1j * alpha)
     height = np.sqrt(part.rod_length**2 - (pin.imag - part.offset) ** 2)

@@ -66,13 +66,13 @@ class WorstTwentieth(Mean):
     name = "worst twentieth"
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """Mean of the longest rows."""
+        """Return the mean of the longest rows."""
         longest = np.sort(lengths(rows))[::-1]
         return float(longest[: max(len(longest) // 20, 1)].mean())
 
 
 def with_unknown_norm(problem: Problem) -> Problem:
-    """The problem with its objective and its first limit of a load in that norm."""
+    """Return the problem with its objective and its first limit of a load in that norm."""
     norm = norm_instance(WorstTwentieth)
     (term,) = problem.objective
     first, *others = problem.limits
@@ -93,7 +93,7 @@ def model_of(problem: Problem) -> LiveModel:
 
 
 def page_of(problem: Problem, folder: Path) -> Path:
-    """A report with the live page, without pictures."""
+    """Return a report with the live page, without pictures."""
     result = evaluate_only(problem)
     path = folder / "report.html"
     path.write_text(as_html(result_document(result, [], "laufruhe"), {}, sliders(result)), encoding="utf-8")
@@ -101,7 +101,7 @@ def page_of(problem: Problem, folder: Path) -> Path:
 
 
 def designs(model: LiveModel, count: int, seed: int = 7) -> list[dict[str, float]]:
-    """Values of all sliders at random between their bounds [SI]."""
+    """Return the values of all sliders at random between their bounds [SI]."""
     draw = random.Random(seed)
     found = []
     for _ in range(count):
@@ -115,7 +115,7 @@ def designs(model: LiveModel, count: int, seed: int = 7) -> list[dict[str, float
 
 
 def evaluated(problem: Problem, model: LiveModel, values: dict[str, float]) -> Evaluation:
-    """A design by the exact model."""
+    """Return the evaluation of a design by the exact model."""
     moved = {slider.name: slider for slider in model.sliders}
     numbers = []
     for decision in problem.decisions:

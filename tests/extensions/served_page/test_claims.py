@@ -46,7 +46,7 @@ def is_modest(claim: dict[str, Any]) -> bool:
 
 
 def exact(path: Path, design: dict[str, float], *edits: Edit) -> float:
-    """Objective of a design by the exact model."""
+    """Return the objective of a design by the exact model."""
     data = json.loads(answers.measure(Source(tables_of(path), path), PageState(edits, design=design)))
     return float(data["objective"])
 

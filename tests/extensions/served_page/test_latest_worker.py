@@ -27,7 +27,7 @@ def desk() -> Iterator[LatestWorker]:
 
 @contextmanager
 def at_work(desk: LatestWorker, askers: ThreadPoolExecutor, folder: Path) -> Iterator[Future[bytes]]:
-    """A request that the desk's process is at: it ends within, when the process is ended, or after that."""
+    """Yield a request that works in the desk's process, and ends with it at the latest."""
     pipe = folder / "pipe"
     os.mkfifo(pipe)
     answer = askers.submit(desk.ask, LONG, Path.read_bytes, pipe)

@@ -51,7 +51,7 @@ LAST = 'body:not(.earlier) #claim[data-last="true"]'
 
 @contextmanager
 def served(path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """The address of a page, and its server."""
+    """Yield the address of a page, and its server."""
     words = [sys.executable, "-c", RUN, "page", str(path), "--no-browser", "--time-limit", "600"]
     running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     assert running.stdout is not None
@@ -99,12 +99,12 @@ def slide(page: Page, control: str, value: float) -> None:
 
 
 def live(page: Page) -> float:
-    """The objective of the design that is shown."""
+    """Return the objective of the design that is shown."""
     return float(page.locator('#live [data-measure="objective"]').get_attribute("data-value") or "nan")
 
 
 def shows(page: Page, value: float, rel: float) -> None:
-    """The design that is shown has this objective, as soon as it is drawn."""
+    """Wait until the page shows a design with this objective."""
     deadline = time.monotonic() + PATIENCE / 1e3
     while live(page) != pytest.approx(value, rel=rel) and time.monotonic() < deadline:
         page.wait_for_timeout(50)

@@ -35,7 +35,7 @@ def acceleration(place: np.ndarray) -> np.ndarray:
 
 
 def columns(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
-    """Force on the frame of what is given, and of one unit of each open number, from places in the ram's plane."""
+    """Return the force on the frame of given numbers, and per unit of each open one, from places in the plane."""
     (part,) = problem.engine.slider_cranks
     assert isinstance(part, SwingingYoke)
     alpha = math.tau * np.arange(STEPS) / STEPS

@@ -24,7 +24,7 @@ SPEED = 9.0
 
 
 def yoke(share: float = 0.37, bank: float = 0.0, throw: float = 0.0, shaft: Shaft = CRANKSHAFT) -> SwingingYoke:
-    """A ram of 400 mm stroke."""
+    """Return a ram of 400 mm stroke."""
     pivot = 0.36
     return SwingingYoke(
         name="cylinder 1", x=0.2, crank_radius=share * pivot, rod_length=math.inf, reciprocating_mass=95.0, throw=throw,
@@ -35,7 +35,7 @@ def yoke(share: float = 0.37, bank: float = 0.0, throw: float = 0.0, shaft: Shaf
 
 
 def places(part: SwingingYoke, phi: np.ndarray) -> tuple[list[tuple[float, np.ndarray]], np.ndarray]:
-    """Masses with their places z + i y about the origin, and the angle of the lever, from geometry alone."""
+    """Return the masses with their places z + i y about the origin, and the angle of the lever, from geometry alone."""
     axis, alpha = np.exp(1j * part.bank), part.shaft.ratio * phi + part.throw - part.bank
     pin = part.crank_radius * np.exp(1j * alpha)
     angle = np.unwrap(np.angle(pin + 1j * part.pivot))
@@ -57,7 +57,7 @@ def derivative(values: np.ndarray) -> np.ndarray:
 
 
 def wrench_of_places(part: SwingingYoke) -> np.ndarray:
-    """Lateral and vertical force and roll moment: loss of momentum, of angular momentum, and reaction to the drive."""
+    """Return force and roll moment from loss of momentum, of angular momentum, and reaction to the drive."""
     phi = math.tau * np.arange(STEPS) / STEPS
     masses, angle = places(part, phi)
     momentum, spin, energy = np.zeros(STEPS, dtype=complex), np.zeros(STEPS), np.zeros(STEPS)
