@@ -29,6 +29,14 @@ PAGE_KEYS = {"extensions/served_page/live/parts.py": {"shown"}}
 """Fields that pages read by their name."""
 SHORT = 10
 """Lines of a private function from which it may have a docstring."""
+TESTS = Path(__file__).parents[1]
+PARTICIPLES = {"told", "asked", "felt", "heard", "kept", "wanted"}
+"""Names that no value, function or class of tests may have."""
+SUSPECTS = re.compile(
+    rf'''^ *r?"""(?:{"|".join(RIDDLES)})\b|(?<![\w."'])_?(?:{"|".join(PARTICIPLES)})\b(?= *(?:[=,:)(\]]|in\b|for\b))''',
+    re.MULTILINE | re.IGNORECASE,
+)
+"""Text without which a file of tests needs no closer look, which takes ten times as long."""
 
 
 def words_of(name: str) -> set[str]:
@@ -84,10 +92,51 @@ def test_names_and_docstrings_are_plain(room: str) -> None:
 @pytest.mark.parametrize("folder", ["attack", "benchmarks"])
 def test_names_and_docstrings_of_tools_are_plain(folder: str) -> None:
     faults = {}
-    for file in sorted((Path(__file__).parents[1] / folder).glob("*.py")):
+    for file in sorted((TESTS / folder).glob("*.py")):
         # short private functions of tools may have a docstring
         faults[file.name] = [fault for fault in faults_of(file.read_text("utf-8")) if "docstring on" not in fault]
     assert not {name: found for name, found in faults.items() if found}
+
+
+def faults_of_tests(text: str) -> list[str]:
+    """Return the names and first words of docstrings that tests may not have, each with its line."""
+    if not SUSPECTS.search(text):
+        return []
+    tree = ast.parse(text)
+    names = [*names_of(tree)]
+    faults = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.append((node.lineno, node.name))
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module):
+            doc = ast.get_docstring(node) or ""
+            if re.split(r"\W", doc, maxsplit=1)[0] in RIDDLES:
+                faults.append(f"{node.body[0].lineno}: docstring {doc.splitlines()[0]}")
+    return faults + [f"{line}: name {name}" for line, name in names if name.strip("_").lower() in PARTICIPLES]
+
+
+def test_names_and_docstrings_of_tests_are_plain() -> None:
+    faults = {}
+    for file in sorted(TESTS.rglob("*.py")):
+        faults[file.relative_to(TESTS).as_posix()] = faults_of_tests(file.read_text("utf-8"))
+    assert not {name: lines for name, lines in faults.items() if lines}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def told(x): ...",
+        "class Felt: ...",
+        "KEPT = 3",
+        "for wanted in (): ...",
+        "f = lambda asked: 0",
+        "(x, heard) = (1, 2)",
+        'def f():\n    """Of a rod."""',
+        '"""What holds."""',
+    ],
+)
+def test_faults_of_tests_are_found(text: str) -> None:
+    assert len(faults_of_tests(text)) == 1
 
 
 @pytest.mark.parametrize(
