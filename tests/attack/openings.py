@@ -188,7 +188,7 @@ class Openings:
         return self.nearest(vector)
 
     def scene(self, vector: np.ndarray, star: Table | None = None, order: tuple[int, ...] | None = None) -> Scene:
-        """Return the design of a vector; `told` replaces keys of [engine] (a star, a bank)."""
+        """Return the design of a vector; `star` replaces keys of [engine] (a star, a bank)."""
         table = {**self.table, **{key: copy.deepcopy(self.table[key]) for key in OPEN_TABLES if key in self.table}}
         table["engine"].update(star or {})
         for (path, low, high), share in zip(self.numbers, vector, strict=False):

@@ -33,12 +33,12 @@ from laufruhe.problem.problem import Problem
 
 OUT = PAGES / "bearings.md"
 PROBLEMS = ROOT / "problems"
-REPEATS, DESIGNS, SAMPLES, WANTED = 5, 40, 720, 1e-5
+REPEATS, DESIGNS, SAMPLES, TARGET = 5, 40, 720, 1e-5
 FORCES: Sequence[LoadChannel] = (channels.MOUNT_FORCE, channels.MAIN_BEARING_FORCE, channels.CRANK_PIN_FORCE)
 
 
 def per_design(problem: Problem, channel: LoadChannel | None) -> float:
-    """Processor time of one design, its webs at random, and the mean of one channel of it [s]."""
+    """Return the processor time of one random design of the webs with the mean of one channel [s]."""
     rng = np.random.default_rng(1964)
     designs = [problem.design(rng.uniform(0.0, 2.0, len(problem.decisions)).tolist()) for _ in range(DESIGNS)]
 
@@ -67,7 +67,7 @@ def of_channels() -> list[str]:
 
 
 def of_optima() -> list[str]:
-    """Proven optima of the same eight webs under the same limit of mass, by mount and by bearing forces."""
+    """Return the proven optima of the same eight webs under the same limit of mass, by mount and by bearing forces."""
     whole = laufruhe.load(PROBLEMS / "tractor-four-bearings.toml")
     mass = tuple(limit for limit in whole.limits if limit.measure.is_mass)
 
@@ -90,7 +90,7 @@ def of_optima() -> list[str]:
 
 
 def carried(four: Scene) -> Spectrum:
-    """Forces on five main bearings over the cycle."""
+    """Return the forces on five main bearings over the cycle."""
     parts = four.engine.slider_cranks
     ends = max(part.x for part in parts) + 0.06, min(part.x for part in parts) - 0.06
     bearings = tuple(Bearing(str(k), x) for k, x in enumerate(np.linspace(*ends, 5)))
@@ -98,7 +98,7 @@ def carried(four: Scene) -> Spectrum:
 
 
 def simulated_error(four: Scene, steps: int) -> float:
-    """Largest difference of what all of them carry over the largest, after a first tenth of a turn."""
+    """Return the largest difference of the bearing forces over the largest one, after a first tenth of a turn."""
     loads = four.multibody.simulate(four.machine, steps, run_in=0, integrator=four.integrator)
     _, left, up = carried(four).values(math.tau * np.arange(steps) / steps).sum(axis=1).T
     off = np.abs(loads.bearings.sum(axis=1) - (up + 1j * left))[steps // 10 :]
@@ -106,12 +106,12 @@ def simulated_error(four: Scene, steps: int) -> float:
 
 
 def simulation_rows() -> list[str]:
-    """Time of one turn of the simulation that comes as near as is wanted, and of the analytic forces."""
+    """Return the time of one turn of the nearest simulation within the tolerance, and of the analytic forces."""
     four = scene()
     tried = []
     for steps in STEPS:
         tried.append((simulated_error(four, steps), steps))
-        if tried[-1][0] <= WANTED:
+        if tried[-1][0] <= TARGET:
             break
     reached, steps = min(tried)
     rounds = []
@@ -141,7 +141,7 @@ def front() -> str:
 
 
 def orders() -> str:
-    """The best firing order and webs of six cylinders."""
+    """Return the line about the best firing order and webs of six cylinders."""
     started = time.process_time()
     result = laufruhe.solve(laufruhe.load(PROBLEMS / "tractor-six-bearings.toml"))
     took = time.process_time() - started
@@ -171,7 +171,7 @@ def main() -> None:
         *optima,
         "",
         "What the bearings of a four-cylinder carry in sum, beside the joints of its throws in exudyn (fewest steps of",
-        f"those tried that reach {WANTED:.0e} of the largest force, generalised-alpha; integration of one turn alone):",
+        f"those tried that reach {TARGET:.0e} of the largest force, generalised-alpha; integration of one turn alone):",
         "",
         "| what | error | ms | simulation over it |",
         "| --- | ---: | ---: | ---: |",

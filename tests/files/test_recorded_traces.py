@@ -1,4 +1,4 @@
-"""Recorded pressure files as test benches write them: every form of one cycle gives the same torque."""
+"""Recorded pressure files as test benches write them, of which every form gives the same torque."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def bench(file: str, folder: Path, engine: str = SINGLE, gas: str = "", speed: i
 
 @pytest.mark.parametrize("file", ["latin-1.csv", "percent.txt", "blanks.txt", "two-headings.csv"])
 def test_headings_comments_and_encodings(file: str, tmp_path: Path) -> None:
-    """An integration of the four files in other code gives 15.595 N m."""
+    """Compare the torque with 15.595 N m, an integration of the four files by other code."""
     assert facts_of(bench(file, tmp_path))[0].torque == pytest.approx(15.595, abs=2e-3)
 
 
@@ -130,7 +130,7 @@ def test_a_row_of_units(tmp_path: Path) -> None:
 
 
 def test_several_cycles_are_averaged(tmp_path: Path) -> None:
-    """An integration of the mean in other code gives 15.73 N m and 407.4 N m."""
+    """Compare the mean and peak with 15.73 N m and 407.4 N m of other code."""
     facts, torque, recording = facts_of(bench("eight-cycles.csv", tmp_path))
     assert facts.torque == pytest.approx(15.73, abs=5e-3)
     assert torque.largest == pytest.approx(407.4, rel=1e-2)
@@ -138,7 +138,7 @@ def test_several_cycles_are_averaged(tmp_path: Path) -> None:
 
 
 def test_noise_in_tenths_of_a_degree(tmp_path: Path) -> None:
-    """The torque is that of the cycle, and no derivative of noise: 405 and -377 N m were such."""
+    """Check that smoothing keeps the mean, and removes the noise that would reach 405 and -377 N m."""
     _, torque, recording = facts_of(bench("tenths-of-a-degree.csv", tmp_path, FOUR))
     assert "Noise: 0.2 bar rms, removed by a low-pass" in " ".join(recording)
     assert torque.excursion == pytest.approx(107.0, rel=1e-2)
@@ -151,10 +151,10 @@ def test_noise_in_tenths_of_a_degree(tmp_path: Path) -> None:
     _, coarse, _ = facts_of(problem_with(tmp_path, "means.csv", engine=FOUR, speed=1500))
     assert torque.largest == pytest.approx(coarse.largest, rel=1e-2)
     assert torque.minimum == pytest.approx(coarse.minimum, abs=1e-2 * coarse.largest)
-    kept = facts_of(bench("tenths-of-a-degree.csv", tmp_path, FOUR, "smooth = false"))[1]
-    assert kept.mean == pytest.approx(torque.mean, rel=1e-7)
-    assert torque.largest < kept.largest < 1.05 * torque.largest
-    assert torque.minimum > kept.minimum > torque.minimum - 0.05 * torque.largest
+    raw = facts_of(bench("tenths-of-a-degree.csv", tmp_path, FOUR, "smooth = false"))[1]
+    assert raw.mean == pytest.approx(torque.mean, rel=1e-7)
+    assert torque.largest < raw.largest < 1.05 * torque.largest
+    assert torque.minimum > raw.minimum > torque.minimum - 0.05 * torque.largest
 
 
 def test_a_zero_at_the_other_dead_centre_is_doubted(tmp_path: Path) -> None:
@@ -335,7 +335,7 @@ def test_units_of_headings(text: str, dimension: str, name: str, is_gauge: bool)
     "text", ["", "CA", "KW", "CA_deg", "PCYL1", "p", "-", "mm^3", "A", "cycle_1", "deg bTDC", "PA2"]
 )
 def test_words_that_are_no_units(text: str) -> None:
-    """An angle before the dead centre counts backwards."""
+    """Check that an angle before the dead centre counts backwards."""
     assert unit_in(text) is None
 
 
@@ -378,7 +378,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_read_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+def test_unreadable_traces_are_refused_in_one_line(name: str, tmp_path: Path) -> None:
     content, gas, said = REFUSED[name]
     (tmp_path / "f.csv").write_text(content, encoding="latin-1")
     with pytest.raises(InputError) as refused:
@@ -435,7 +435,7 @@ def test_a_four_stroke_file_in_a_two_stroke_engine_is_refused(tmp_path: Path) ->
 
 
 def test_turns_without_gas_exchange_are_refused(tmp_path: Path) -> None:
-    """A record of the turn around firing alone would give twice the work."""
+    """Check that a record of the firing turn alone, which would give twice the work, is refused."""
     turn = np.arange(-180.0, 180.0)
     (tmp_path / "f.csv").write_text(rows(np.tile(turn, 4), np.tile(cycle_pressure(turn), 4)))
     with pytest.raises(InputError, match="has the same pressures in both turns of its four-stroke cycle; check engine"):
@@ -584,7 +584,7 @@ def test_statistics_of_a_test_bench_are_no_cycles(tmp_path: Path) -> None:
 
 
 def test_common_angles_have_one_zero(tmp_path: Path) -> None:
-    """A wrong order of firing moves a cylinder by a turn, which is no other dead centre."""
+    """Check that a wrong firing order moves a cylinder by a turn to the same dead centre."""
     four = [np.interp(DEGREES - late, DEGREES, P, period=720.0) for late in (0.0, 540.0, 180.0, 360.0)]
     in_columns(tmp_path, {f"PCYL{k}": values for k, values in enumerate(four, 1)})
     gas = 'cylinder_columns = [2, 3, 4, 5]\ncylinder_angles = "common"'

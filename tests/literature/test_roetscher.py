@@ -65,13 +65,13 @@ def _single(rod_ratio: float, mass: float = 1.0, radius: float = 1.0) -> Engine:
 
 
 def _mass_force(rod_ratio: float, degrees: float, fidelity: Fidelity) -> float:
-    """Force along the cylinder axis over m r w^2, as printed: cos phi +- R/L cos 2 phi."""
+    """Return the force along the cylinder axis over m r w^2, as printed: cos phi +- R/L cos 2 phi."""
     loads = reciprocating_loads(_single(rod_ratio), 1.0, fidelity)
     return float(loads.values(np.radians([degrees]))[0, 2])
 
 
 def _speed(rod_ratio: float, phi: float) -> float:
-    """Piston speed over pin speed, positive on the way out, sin(phi + psi) / cos psi."""
+    """Return piston speed over pin speed, positive on the way out, sin(phi + psi) / cos psi."""
     return -float(slider_crank.piston_velocity(np, phi, rod_ratio, 0.0))
 
 

@@ -32,7 +32,7 @@ def part_of(drive: str) -> SliderCrank:
 
 
 def test_scotch_yoke() -> None:
-    """Below Fig. 1069, eqs. 287, 289, 295: x = R (1 - cos phi), c = v sin phi, b = v^2/R cos phi."""
+    """Check eqs. 287, 289, 295 below Fig. 1069: x = R (1 - cos phi), c = v sin phi, b = v^2/R cos phi."""
     yoke, radius, speed = part_of('drive = "scotch-yoke"'), 0.4, 50.0 * math.tau / 60.0
     v = radius * speed
     assert yoke == part_of("rod_ratio = 0")
@@ -45,7 +45,7 @@ def test_scotch_yoke() -> None:
 def test_kleins_drive_loads_its_block_as_a_slider_crank() -> None:
     """Fig. 1068: the rod swings in a frame between two piston rods, which take the side force by bending."""
     rod = 'rod_length = "2 m"'
-    klein, plain = (laufruhe.load(FILE.format(drive=told)) for told in (f'drive = "klein"\n{rod}', rod))
+    klein, plain = (laufruhe.load(FILE.format(drive=text)) for text in (f'drive = "klein"\n{rod}', rod))
     loads = [shaking_loads(own.engine, own.points[0]).values(ANGLES) for own in (klein, plain)]
     assert np.array_equal(*loads)
     assert np.abs(loads[0][:, 2]).max() == pytest.approx(830.0 * 0.4 * klein.points[0].speed ** 2 * 1.2, rel=1e-12)

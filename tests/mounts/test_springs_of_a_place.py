@@ -1,4 +1,4 @@
-"""Damping that follows stiffness, and springs joined in one place: plain sums, time integration, bounds, refusals."""
+"""Damping that follows stiffness, and joined springs: plain sums, time integration, bounds, refused input."""
 
 from __future__ import annotations
 
@@ -63,16 +63,16 @@ def test_one_mass_on_a_lagging_spring_moves_as_it_does_in_time() -> None:
     assert (travel * np.exp(1j * omega * times)).real == pytest.approx(found, abs=1e-6 * np.abs(found).max())
 
 
-ASKED = {
+OBJECTIVES = {
     "rms": RMS,
     "mean": '[objective]\nminimise = "mean mount force"\n',
     "travel": '[objective]\nminimise = "maximum mount travel"\n',
 }
 
 
-@pytest.mark.parametrize("name", ASKED)
+@pytest.mark.parametrize("name", OBJECTIVES)
 def test_bounds_know_damping_that_follows(name: str, tmp_path: Path) -> None:
-    problem = problem_of(tmp_path, ENGINE, BLOCK, FOLLOWING, ASKED[name])
+    problem = problem_of(tmp_path, ENGINE, BLOCK, FOLLOWING, OBJECTIVES[name])
     ratios = bounds_over_designs(problem)
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
@@ -186,7 +186,7 @@ JOINED = '[[mounts.places]]\nname = "pad"\njoined_to = "front left"\nstiffness =
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "message"),
     [
         (JOINED.replace('"front left"', '"pad"'), 'joined_to = "pad": is not the name of a mount'),
         (JOINED + 'position = ["0 mm", "0 mm", "0 mm"]', "already follows from mount 'front left'"),
@@ -198,7 +198,7 @@ JOINED = '[[mounts.places]]\nname = "pad"\njoined_to = "front left"\nstiffness =
         (JOINED + "damping_per_stiffness = 0.001", "has no unit"),
     ],
 )
-def test_meaningless_input_is_refused_in_a_line(more: str, told: str, tmp_path: Path) -> None:
+def test_meaningless_input_is_refused_in_a_line(more: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(InputError) as refused:
         problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, more, RMS)
-    assert told in str(refused.value)
+    assert message in str(refused.value)

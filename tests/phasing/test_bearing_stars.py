@@ -1,4 +1,4 @@
-"""Stars and firing orders decided by loads inside the crankcase: every one solved by itself is the judge."""
+"""Stars and firing orders under loads inside the crankcase, compared with each one solved by itself."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ Tables = Mapping[str, Any]
 OPEN: Tables = {"mass": {"between": ["0 kg", "3 kg"]}}
 
 
-def tables(count: int, objective: Tables, web: Tables | None = None, **told: Any) -> dict[str, Any]:
-    """An engine in line with a bearing on either side of every throw; a key of `told` that is None is left out."""
+def tables(count: int, objective: Tables, web: Tables | None = None, **changes: Any) -> dict[str, Any]:
+    """Return an engine in line with bearings beside every throw; a key of `changes` that is None is dropped."""
     half = 62.5 * count
     engine = {key: value for key, value in THREE["engine"].items() if key != "firing_order"}
     whole = {key: value for key, value in THREE.items() if key not in LEFT_OUT}
     whole |= {
-        "engine": engine | {"throws": "open", "cylinders": count} | told.pop("engine", {}),
+        "engine": engine | {"throws": "open", "cylinders": count} | changes.pop("engine", {}),
         "objective": objective,
     }
     whole["fidelity"] = {"samples": 96}
@@ -49,7 +49,7 @@ def tables(count: int, objective: Tables, web: Tables | None = None, **told: Any
             }
             for k in range(count)
         ]
-    return {key: value for key, value in (whole | told).items() if value is not None}
+    return {key: value for key, value in (whole | changes).items() if value is not None}
 
 
 def problem_of(whole: Tables) -> Problem:
@@ -57,7 +57,7 @@ def problem_of(whole: Tables) -> Problem:
 
 
 def one_by_one(whole: Tables) -> dict[tuple[int, ...], Result]:
-    """Every firing order as a problem of its own, its throws those that make it even."""
+    """Return the result of every firing order with the throws that it makes even."""
     count = whole["engine"]["cylinders"]
     engine = {key: value for key, value in whole["engine"].items() if key not in ("throws", "cylinders")}
     orders = [(1, *rest) for rest in itertools.permutations(range(2, count + 1))]
@@ -101,7 +101,7 @@ CASES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_the_best_order_is_that_of_all_solved_one_by_one(name: str) -> None:
-    """Its value, and no bound over the least of any: what is proven of all holds for each."""
+    """Compare the best order and the bound with every firing order solved by itself."""
     whole = {**CASES[name], "tolerance": 1e-3}
     result = laufruhe.solve(problem_of(whole))
     # at as many angles as the search found necessary, the gas at those of the file
@@ -134,7 +134,7 @@ def test_a_ranking_lists_orders_by_what_each_is_worth() -> None:
 
 
 def test_throws_given_and_their_firing_order_open() -> None:
-    """Two orders of one flat crank load the bearings alike in no norm but by symmetry: all are looked at."""
+    """Check that both orders of a flat crank are solved, because their bearing loads differ."""
     crank = {"throws": [0, 180, 0, 180], "firing_order": "open", "cylinders": None}
     whole = tables(4, bearing("mean"), {"mass": "1 kg"})
     whole["engine"] = {key: value for key, value in (whole["engine"] | crank).items() if value is not None}
@@ -150,7 +150,7 @@ BETWEEN = [{"x": f"{x} mm"} for x in (190, 60, -60, -190)]
 
 @pytest.mark.slow
 def test_two_rods_on_a_pin_are_decided_order_by_order() -> None:
-    """The best of all firing orders of all even stars, each as a problem of its own."""
+    """Compare with all firing orders of all even stars, each solved by itself."""
     one_bearing = bearing("mean", bearings=["2"])
     whole = tables(6, one_bearing, engine=VEE, main_bearings=BETWEEN, phasing={"best": 4})
     result = laufruhe.solve(problem_of(whole))
@@ -173,7 +173,7 @@ def test_two_rods_on_a_pin_are_decided_order_by_order() -> None:
 
 
 def test_without_gas_two_rods_on_a_pin_are_decided() -> None:
-    """Inertia alone does not feel the firing order, so banks that share throws are stars like any other."""
+    """Check that inertia alone makes banks with shared throws stars like any other."""
     whole = tables(6, bearing("mean"), engine=VEE, gas=None, main_bearings=BETWEEN)
     result = laufruhe.solve(problem_of(whole))
     assert result.certificate.kind is Proof.GLOBAL
@@ -185,7 +185,7 @@ def test_without_gas_two_rods_on_a_pin_are_decided() -> None:
 
 
 def test_rows_of_stresses_that_one_throw_brings_to_the_next_are_those_of_the_exact_model() -> None:
-    """Torque of the throws before it goes through a journal: the places of one cylinder are not its own alone."""
+    """Check the torque that a journal takes from the throws before it."""
     gear = {"webs": {"thickness": "25 mm", "width": "110 mm"}}
     whole = tables(4, {"minimise": "rms journal stress"}, running_gear=gear,
                    engine={"big_end": {"diameter": "70 mm", "width": "30 mm"}})  # fmt: skip

@@ -1,4 +1,4 @@
-"""Degree of irregularity over firing orders and stars: against brute force."""
+"""Degree of irregularity over firing orders and stars, compared with brute force."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def problem_of(engine: dict[str, Any] | None = None, **more: Any) -> Problem:
 
 
 def by_order(problem: Problem) -> dict[tuple[int, ...], float]:
-    """Degree of every firing order, each engine built anew."""
+    """Return the degree of irregularity of every firing order, each engine built anew."""
     phasing = problem.phasing
     layout = phasing.layout(None, None)
     found = {}
@@ -63,32 +63,34 @@ def test_the_best_firing_order_is_that_of_all_of_them(uneven: Any) -> None:
 
 
 def test_a_limit_takes_orders_away(uneven: Any) -> None:
-    """Those under it are all that is left, and below the least none is; the couple of pistons chooses among them."""
+    """Check that only orders within the limit remain, of which the torque chooses; below the least, none."""
     _, _, every = uneven
     values = sorted(every.values())
     limit = 0.5 * (values[1] + values[2])
-    told = {"limit": "degree of irregularity", "max": f"{limit:.6f}"}
-    found = laufruhe.solve(problem_of(phasing=WIDE, constraints=[told], objective={"minimise": "rms crank torque"}))
+    limit_table = {"limit": "degree of irregularity", "max": f"{limit:.6f}"}
+    found = laufruhe.solve(
+        problem_of(phasing=WIDE, constraints=[limit_table], objective={"minimise": "rms crank torque"})
+    )
     assert found.status is Status.OPTIMAL
-    kept = [order for order, value in every.items() if value <= limit]
-    assert found.phasing.ranking[0].firing_orders[0].order in kept
+    feasible = [order for order, value in every.items() if value <= limit]
+    assert found.phasing.ranking[0].firing_orders[0].order in feasible
     torques = {
         order: evaluate(one).value(one.objective[0].measure)
-        for order in kept
+        for order in feasible
         for one in [
             problem_of({"throws": THROWS, "firing_order": list(order)}, objective={"minimise": "rms crank torque"})
         ]
     }
     assert found.objective.value == pytest.approx(min(torques.values()), rel=1e-9)
     none = laufruhe.solve(
-        problem_of(phasing=WIDE, constraints=[{**told, "max": f"{0.9 * values[0]:.6f}"}],
+        problem_of(phasing=WIDE, constraints=[{**limit_table, "max": f"{0.9 * values[0]:.6f}"}],
                    objective={"minimise": "rms crank torque"})
     )  # fmt: skip
     assert none.status is Status.INFEASIBLE
 
 
 def test_stars_that_fire_evenly_turn_alike() -> None:
-    """Every star has the same degree to a rounding: the couple decides, with the degree in the sum or limited."""
+    """Check that the couple decides among stars of equal degree, with the degree in the sum or limited."""
     opened = {"throws": "open", "firing_order": "open", "cylinders": 5}
     orders = ([1, 2, 4, 5, 3], [1, 5, 2, 3, 4], [1, 3, 5, 2, 4])
     engines = [problem_of({"firing_order": order, "cylinders": 5}).engine for order in orders]
@@ -115,7 +117,7 @@ def test_stars_that_fire_evenly_turn_alike() -> None:
 
 @pytest.mark.slow
 def test_a_number_of_the_wheel_alone_is_the_same_for_uneven_throws() -> None:
-    """Throws move the torque, and nothing of the wheel itself; no mounts are needed for it."""
+    """Check that throws change the torque, not the flywheel, without mounts."""
     rim = {"mean_diameter": "300 mm", "width": "60 mm", "height": "40 mm"}
     problem = problem_of(
         {

@@ -58,7 +58,7 @@ LOADS = (
 
 
 def problem_of(engine: dict[str, Any], quantity: str, throws: int = 3, **changes: Any) -> Problem:
-    """Return an engine with a bearing on either side of every throw; a key of `told` that is None is left out."""
+    """Return an engine with a bearing on either side of every throw; a key of `changes` that is None is left out."""
     half = 62.5 * throws
     bare = {key: value for key, value in THREE["engine"].items() if key not in ("firing_order", "throws")}
     whole = {key: value for key, value in THREE.items() if key not in ("constraints", "counterweights")}

@@ -1,4 +1,4 @@
-"""Loads of crank pins and main bearings: what they add up to, and what they follow."""
+"""Loads of crank pins and main bearings: their sums, and the loads that they follow."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ROD = Rod(0.2, 1.9, 0.07, 0.011)
 
 
 def engine_of(seed: int) -> Engine:
-    """A crankshaft with throws, banks, offsets and counterweights at random, in five bearings, beside a balancer."""
+    """Return a random crankshaft of throws, banks, offsets and counterweights in five bearings, with a balancer."""
     random = np.random.default_rng(seed)
     parts = []
     for k in range(4):
@@ -55,7 +55,7 @@ def engine_of(seed: int) -> Engine:
 
 
 def walls_and_heads(engine: Engine, steps: int) -> FloatArray:
-    """Wrench of the pistons on their walls and of the gas on the heads, from what the pins carry, shape (steps, 6)."""
+    """Return the wrench of pistons on walls and of gas on heads from the pin forces, shape (steps, 6)."""
     phi = engine.cycle.angle * np.arange(steps) / steps
     pins = pin_forces(engine, POINT, replace(EXACT, samples=steps)).sample(steps)
     total = np.zeros((steps, 6))
@@ -78,7 +78,7 @@ def walls_and_heads(engine: Engine, steps: int) -> FloatArray:
 
 
 def on_grid(engine: Engine, steps: int) -> Engine:
-    """The engine with throws and banks on a grid of its angles, so that gas is sampled where it is given."""
+    """Return the engine with throws and banks on a grid of its angles, at which gas is sampled."""
     grid = engine.cycle.angle / steps
     parts = []
     for part in engine.slider_cranks:
@@ -89,7 +89,7 @@ def on_grid(engine: Engine, steps: int) -> Engine:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_bearings_walls_heads_and_balancers_make_the_shaking_loads(seed: int) -> None:
-    """Newton's third law for the block, forces and moments, to rounding: gas and inertia by different formulas."""
+    """Check Newton's third law of the block for forces and moments, by independent formulas."""
     steps = 2880
     engine = on_grid(engine_of(seed), steps)
     fidelity = replace(EXACT, samples=steps)
@@ -100,15 +100,15 @@ def test_bearings_walls_heads_and_balancers_make_the_shaking_loads(seed: int) ->
     balancer = rotor_loads(engine.rotors[-1:], POINT.speed, engine.cycle).sample(steps)
     outside = walls_and_heads(engine, steps)
     total = inside + outside + balancer
-    wanted = shaking_loads(engine, POINT, fidelity).sample(steps)
+    expected = shaking_loads(engine, POINT, fidelity).sample(steps)
     # the largest force of those that cancel; a thousand terms leave up to 1e-12 of it, by the order they are added in
     size = max(np.abs(bearings).max(), np.abs(outside).max())
-    assert np.abs(total - wanted).max() < 3e-12 * size
+    assert np.abs(total - expected).max() < 3e-12 * size
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_pin_forces_are_those_of_newton_and_euler(seed: int) -> None:
-    """Rod and piston as rigid bodies, accelerations by differences of places, joint forces by their balances."""
+    """Compare with rigid bodies, accelerations by differences of places, and joint forces in balance."""
     engine = engine_of(seed)
     part, speed, step = engine.slider_cranks[seed], POINT.speed, 1e-3
     phi = np.linspace(0.0, math.tau, 25)
@@ -138,8 +138,8 @@ def test_pin_forces_are_those_of_newton_and_euler(seed: int) -> None:
         right = [ROD.mass * of_rod[k].real, ROD.mass * of_rod[k].imag, ROD.inertia * of_angle[k].real,
                  mass * of_piston[k].real, mass * of_piston[k].imag]  # fmt: skip
         forces = np.linalg.solve(balance, np.array(right))
-        wanted = -complex(forces[2], forces[3]) * cmath.exp(1j * part.bank)
-        assert found[k, 2] + 1j * found[k, 1] == pytest.approx(wanted, abs=1e-6 * abs(wanted) + 0.02)
+        expected = -complex(forces[2], forces[3]) * cmath.exp(1j * part.bank)
+        assert found[k, 2] + 1j * found[k, 1] == pytest.approx(expected, abs=1e-6 * abs(expected) + 0.02)
 
 
 def test_bearings_are_linear_in_the_unbalances_of_their_shaft() -> None:
@@ -166,7 +166,7 @@ def test_lever_rule_keeps_forces_and_moments() -> None:
 
 
 def test_turning_the_engine_turns_its_loads() -> None:
-    """A crank and its banks turned by an angle, in the plane across the crank."""
+    """Check that a crank and banks rotated by an angle rotate the loads."""
     engine, angle = engine_of(2), 0.7
     parts = (replace(p, throw=p.throw + angle, bank=p.bank + angle) for p in engine.slider_cranks)
     rotors = (replace(r, unbalance=r.unbalance * cis(angle / math.tau)) for r in engine.rotors[:-1])
@@ -188,7 +188,7 @@ def test_uneven_speed_is_refused() -> None:
 
 
 def three_moments(bearings: FloatArray, place: float) -> FloatArray:
-    """Reactions of a unit load inside a beam by Clapeyron's equations of the moments over its supports."""
+    """Return the reactions of a unit load in a beam by Clapeyron's equations of moments over its supports."""
     n, spans = len(bearings), np.diff(bearings)
     k = int(np.searchsorted(bearings, place)) - 1
     a = place - bearings[k]
@@ -218,7 +218,7 @@ def test_a_beam_shares_as_the_three_moment_equations_say(count: int) -> None:
 
 
 def test_a_beam_keeps_forces_and_moments() -> None:
-    """Overhanging loads and loads at a bearing among them; by the lever rule on two bearings."""
+    """Check overhanging loads, loads at a bearing, and the lever rule on two bearings."""
     bearings, places = [0.2, -0.1, 0.05, -0.3], [0.3, 0.2, 0.1, -0.03, -0.1, -0.4]
     shares = beam_shares(bearings, places)
     assert shares.sum(axis=0) == pytest.approx(1.0)
@@ -230,7 +230,7 @@ def test_a_beam_keeps_forces_and_moments() -> None:
 
 
 def test_peaks_stand_where_heat_comes_at_once() -> None:
-    """The pressure jumps there, between any steps: the largest load is found whatever these are."""
+    """Check that the peak load at a pressure jump does not depend on the steps."""
     engine = engine_of(0)
     found = []
     for steps in (360, 720, 1440):
@@ -255,7 +255,7 @@ def test_peaks_stand_where_heat_comes_at_once() -> None:
 
 
 def test_piston_pins_carry_what_rods_and_walls_do() -> None:
-    """P + i N along the cylinders is the force of the rods on their pins, less what turns at these."""
+    """Compare P + i N along the cylinders with the force of the rods on their pins."""
     engine = engine_of(4)
     phi = np.linspace(0.0, 4.0 * math.pi, 41)
     found, pins = (of(engine, POINT).values(phi) for of in (piston_pin_forces, pin_forces))
@@ -276,7 +276,7 @@ def test_pressure_on_a_pin_is_that_of_its_rod() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_pins_drive_the_crank_with_its_torque(seed: int) -> None:
-    """Virtual power: the forces of the rods on pins that move with the crank, and what they do to it in sum."""
+    """Compare the work of rod forces on the moving pins with the crank torque."""
     engine = engine_of(seed)
     phi = np.linspace(0.0, 4.0 * math.pi, 61)
     pins, torque = pin_forces(engine, POINT).values(phi), crank_torque(engine, POINT).values(phi)

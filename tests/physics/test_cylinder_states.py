@@ -1,4 +1,4 @@
-"""Misfire and cut cylinders against volumes, work and torque written anew here."""
+"""Misfire and cut cylinders, compared with independent volumes, work and torque."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def unfired_torque(valves: str) -> np.ndarray:
     ids=["misfire", "closed", "open"],
 )
 def test_torque_lacks_combustion_of_one_cylinder_alone(state: dict[str, Any], valves: str) -> None:
-    """The engine's torque is that of all cylinders, less the fired and plus the unfired torque of cylinder 3."""
+    """Compare the torque with that of all cylinders, with cylinder 3 unfired instead of fired."""
     point = {"name": "all", "speed": "900 rpm"}
     problem = laufruhe.load(engine_tables(point, {**point, "name": "one out", **state}))
     every, out = problem.points
@@ -91,7 +91,7 @@ def test_torque_lacks_combustion_of_one_cylinder_alone(state: dict[str, Any], va
 
 
 def test_a_recorded_cylinder_without_combustion_is_that_of_misfire(tmp_path: Path) -> None:
-    """Traces of both pressures, in one file, against the cycles that they were computed from."""
+    """Compare traces of both pressures in one file with the cycles behind them."""
     points = ({"name": "all", "speed": "900 rpm"}, {"name": "out", "speed": "900 rpm", "misfire": [3]},
               {"name": "motored", "speed": "900 rpm", "motored": True})  # fmt: skip
     computed = laufruhe.load(engine_tables(*points))
@@ -102,8 +102,8 @@ def test_a_recorded_cylinder_without_combustion_is_that_of_misfire(tmp_path: Pat
     gas = {"model": "trace", "file": str(tmp_path / "both.csv"), "pressure_column": "fired", "smooth": False}
     recorded = laufruhe.load(engine_tables(*points) | {"gas": {**gas, "motored_column": "motored"}})
     for one, other in zip(recorded.points, computed.points, strict=True):
-        found, wanted = (crank_torque(computed.engine, point).sample(360) for point in (one, other))
-        assert np.abs(found - wanted).max() < 5e-3 * np.abs(wanted).max()
+        found, expected = (crank_torque(computed.engine, point).sample(360) for point in (one, other))
+        assert np.abs(found - expected).max() < 5e-3 * np.abs(expected).max()
     turning = [turning_torque(computed.engine, problem.points[0]) for problem in (recorded, computed)]
     assert turning[0].torque == pytest.approx(turning[1].torque, rel=5e-3)
     with pytest.raises(InputError, match="record it too and name its motored_column"):
@@ -132,7 +132,7 @@ def test_work_of_a_cycle_is_that_of_the_cylinders_that_fire() -> None:
 
 
 def test_states_take_the_gas_of_their_own_cylinder() -> None:
-    """A cylinder of another compression ratio keeps it when it misfires; others keep their imep."""
+    """Check that a misfiring cylinder keeps its compression ratio, and the others their imep."""
     tables = engine_tables({"name": "p", "speed": "900 rpm", "misfire": [2]})
     tables["gas"]["single_cylinders"] = [
         {"cylinders": [2], "compression_ratio": 8.0}, {"cylinders": [4], "imep": "5 bar"},
@@ -147,7 +147,7 @@ def test_states_take_the_gas_of_their_own_cylinder() -> None:
 
 
 def test_torsion_takes_the_gas_of_each_cylinder() -> None:
-    """The torques of single cylinders add up to that of the engine."""
+    """Check that the torques of single cylinders add up to that of the engine."""
     problem = laufruhe.load(engine_tables({"name": "p", "speed": "900 rpm", "misfire": [2], "cut": [4]}))
     engine, point = problem.engine, problem.points[0]
     total = crank_torque(engine, point).coefficients[:40]
@@ -160,7 +160,7 @@ def test_torsion_takes_the_gas_of_each_cylinder() -> None:
 
 
 def test_bearings_and_flywheel_follow_the_state() -> None:
-    """The rods' forces on their pins drive the crank with its torque, and the work stored is that of the torque."""
+    """Check that rod forces give the crank torque, and that stored work is that of the torque."""
     tables = engine_tables({"name": "p", "speed": "900 rpm", "misfire": [2], "cut": [4]})
     problem = laufruhe.load({**tables, "flywheel": {"inertia": "0.3 kg m^2"}})
     engine, point = problem.engine, problem.points[0]
@@ -222,7 +222,7 @@ def test_messages(keys: dict[str, Any], gas: dict[str, Any] | None, message: str
 
 @pytest.mark.slow
 def test_open_throws_are_the_best_of_all_firing_orders() -> None:
-    """The proven star and order for a cut cylinder is the best of each even crank solved by itself."""
+    """Compare star and order for a cut cylinder with each even crank solved by itself."""
     point = {"name": "p", "speed": "1800 rpm", "cut": [2], "cut_valves": "open", "misfire": [1]}
     mounts = {
         "mounts": {

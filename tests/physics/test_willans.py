@@ -63,14 +63,14 @@ def solved() -> laufruhe.solvers.Result:
 
 
 def test_mean_pressure_of_the_bench_manual() -> None:
-    """DW10: 250 N m of 1997 cm3 are 15.7 bar."""
+    """Check that 250 N m of the DW10 with 1997 cm3 are 15.7 bar."""
     assert mean_pressure(250.0, 1997e-6, 2) == pytest.approx(15.7e5, rel=3e-3)
     # and of the indicated work: torque times the angle of a cycle over the displacement
     assert mean_pressure(250.0, 1997e-6, 1) == pytest.approx(0.5 * mean_pressure(250.0, 1997e-6, 2))
 
 
 def test_line_and_deviation_are_those_of_regression() -> None:
-    """Against SciPy's curve_fit, which fits the friction itself and tells its variance."""
+    """Compare with SciPy's curve_fit, which fits friction and its variance."""
     found = willans_friction(LOADS, FUEL)
     (_, friction), covariance = optimize.curve_fit(lambda x, b, f: b * (x + f), LOADS, FUEL, (4e-6, 2e5))
     assert found.mean == pytest.approx(friction, rel=1e-6)
@@ -82,14 +82,14 @@ def test_deviation_is_that_of_many_scattered_tables() -> None:
     truth, scatter = 0.4 * (LOADS * 1e-5 + 2.0), 0.02
     many = [willans_friction(LOADS, truth + rng.normal(0.0, scatter, len(LOADS))) for _ in range(3000)]
     spread = float(np.std([each.mean for each in many]))
-    told = math.sqrt(float(np.mean([each.deviation**2 for each in many])))
-    assert told == pytest.approx(spread, rel=0.05)
+    mean_deviation = math.sqrt(float(np.mean([each.deviation**2 for each in many])))
+    assert mean_deviation == pytest.approx(spread, rel=0.05)
     assert np.mean([each.mean for each in many]) == pytest.approx(2e5, rel=0.01)
 
 
 @given(st.floats(0.01, 100.0), st.floats(0.1, 10.0))
 def test_units_of_fuel_and_load(fuel: float, load: float) -> None:
-    """The unit of the fuel does not count; friction has that of the load."""
+    """Check that friction has the unit of the load, and does not depend on the unit of fuel."""
     one, other = willans_friction(LOADS, FUEL), willans_friction(load * LOADS, fuel * FUEL)
     assert other.mean == pytest.approx(load * one.mean, rel=1e-9)
     assert other.deviation == pytest.approx(load * one.deviation, rel=1e-6)
@@ -120,7 +120,7 @@ def test_tables_that_make_no_line(loads: list[float], fuel: list[float], rule: s
 
 @pytest.mark.slow
 def test_scenarios_of_the_ready_problem(solved: laufruhe.solvers.Result) -> None:
-    """Both loads stand at the middle and two deviations to either side; the worst of them all is proven least."""
+    """Check loads at the middle and two deviations to either side, and that their worst is proven least."""
     problem = solved.problem
     assert len(problem.points) == 6
     loads = [point.gas.imep for point in problem.points[:3]]
@@ -144,7 +144,7 @@ def test_scenarios_of_the_ready_problem(solved: laufruhe.solvers.Result) -> None
 
 @pytest.mark.slow
 def test_no_load_between_is_worse_than_the_ends(solved: laufruhe.solvers.Result) -> None:
-    """The pressure of a cycle of finite heat release is affine in imep, and a mean of lengths convex: the ends tell."""
+    """Check that the ends are worst: pressure is affine in imep, and a mean of lengths convex."""
     problem = solved.problem
     point = problem.points[0]
     low, high = problem.points[0].gas.imep, problem.points[2].gas.imep
@@ -160,16 +160,16 @@ def test_no_load_between_is_worse_than_the_ends(solved: laufruhe.solvers.Result)
     assert worst == pytest.approx(ends.value(problem.objective[0].measure), rel=1e-9)
 
 
-def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
+def test_loads_at_the_brake_from_a_file_and_by_fmep(tmp_path: Path) -> None:
     (tmp_path / "fuel.csv").write_text(ROWS, encoding="utf-8")
     problem = loaded(tmp_path, BRAKE)
     assert [point.name for point in problem.points] == [f"pulling, {which} load" for which in ("least", "mean", "most")]
     middle = problem.points[1].gas.imep
-    told = changed(BRAKE, 'file = "fuel.csv"', 'fmep = "2 bar"')
-    (only,) = loaded(tmp_path, told).points
+    text = changed(BRAKE, 'file = "fuel.csv"', 'fmep = "2 bar"')
+    (only,) = loaded(tmp_path, text).points
     volume = math.pi / 4 * 0.085**2 * 0.088 * 4
     assert only.gas.imep == pytest.approx(mean_pressure(250.0, volume, 2) + 2e5)
-    apart = loaded(tmp_path, changed(told, '"2 bar"', '"2 bar"\ndeviation = "0.3 bar"\ndeviations = 1')).points
+    apart = loaded(tmp_path, changed(text, '"2 bar"', '"2 bar"\ndeviation = "0.3 bar"\ndeviations = 1')).points
     assert apart[2].gas.imep - apart[0].gas.imep == pytest.approx(0.6e5)
     (tmp_path / "fuel.csv").write_text("1000;0,9\n2000;1,5\n3000;2,0\n", encoding="utf-8")
     drag = changed(BRAKE, 'file = "fuel.csv"', 'file = "fuel.csv"\nkind = "motoring"\nload_unit = "bar"')
@@ -178,11 +178,11 @@ def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("fidelity", [EXACT, Fidelity(crank_inertia=0.5), Fidelity(gas_orders=4)])
 def test_the_mean_roll_moment_is_the_brake_torque(fidelity: Fidelity, tmp_path: Path) -> None:
-    """L5b: at a brake torque, at idle, at an imep, and in every torque; orders above zero are those of the gas."""
-    told = changed(BRAKE, 'file = "fuel.csv"', 'fmep = "2 bar"')
+    """Check L5b at a brake torque, at idle and at an imep; orders above zero are those of the gas."""
+    text = changed(BRAKE, 'file = "fuel.csv"', 'fmep = "2 bar"')
     idle = '\n[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nbmep = "0 bar"\n'
     given = '[[operating_points]]\nname = "given"\nspeed = "800 rpm"\nimep = "3 bar"\n[gas]'
-    problem = loaded(tmp_path, changed(told, "[gas]", idle + given))
+    problem = loaded(tmp_path, changed(text, "[gas]", idle + given))
     volume = math.pi / 4 * 0.085**2 * 0.088 * 4
     for point, torque in zip(problem.points, (250.0, 0.0, 1e5 * volume / (4.0 * math.pi)), strict=True):
         loads = shaking_loads(problem.engine, point, fidelity)
@@ -222,7 +222,7 @@ def test_the_mean_roll_moment_is_the_brake_torque(fidelity: Fidelity, tmp_path: 
         (ROWS, 'bore = "85 mm"', "", "bore"),
     ],
 )  # fmt: skip
-def test_what_makes_no_load_is_refused_in_one_line(rows: str, old: str, new: str, said: str, tmp_path: Path) -> None:
+def test_bad_friction_data_are_refused_in_one_line(rows: str, old: str, new: str, said: str, tmp_path: Path) -> None:
     (tmp_path / "fuel.csv").write_text(rows, encoding="utf-8")
     with pytest.raises(InputError) as refused:
         loaded(tmp_path, changed(BRAKE, old, new) if old else BRAKE)
@@ -232,7 +232,7 @@ def test_what_makes_no_load_is_refused_in_one_line(rows: str, old: str, new: str
 
 @pytest.mark.slow
 def test_a_limit_on_the_worst_mean_is_one_on_every_point(tmp_path: Path) -> None:
-    """Least unbalance under it, and under a limit at each operating point: the same design, and the same price."""
+    """Check equal designs and prices under the worst mean and under a limit at each point."""
     problem = laufruhe.load(PROBLEMS / "car-four-willans.toml")
     text = (PROBLEMS / "car-four-willans.toml").read_text(encoding="utf-8")
     text = text[: text.index("[objective]")].replace("unbalance = {", 'radius = "30 mm"\nunbalance = {')
@@ -252,7 +252,7 @@ def test_a_limit_on_the_worst_mean_is_one_on_every_point(tmp_path: Path) -> None
 
 
 def test_the_line_is_drawn_down_to_no_fuel(tmp_path: Path) -> None:
-    """Of a fuel table and of motoring: readings, line, friction with its deviations; nothing where it is only told."""
+    """Check the picture of a fuel table and of motoring, and that a given fmep has none."""
     (tmp_path / "fuel.csv").write_text(
         "speed,load,fuel\n" + "\n".join(f"1750,{load},{fuel}" for load, fuel in zip(LOADS * 1e-5, FUEL, strict=True))
     )
@@ -260,8 +260,8 @@ def test_the_line_is_drawn_down_to_no_fuel(tmp_path: Path) -> None:
     own = '[friction]\nfile = "fuel.csv"\n'
     fuelled = '[friction]\nfile = "fuel.csv"\nload_unit = "bar"\n'
     motored = '[friction]\nfile = "drag.csv"\nkind = "motoring"\nload_unit = "bar"\n'
-    for told in (fuelled, motored):
-        result = laufruhe.evaluate(loaded(tmp_path, changed(BRAKE, own, told)))
+    for replacement in (fuelled, motored):
+        result = laufruhe.evaluate(loaded(tmp_path, changed(BRAKE, own, replacement)))
         (test,) = result.problem.friction
         intercept, slope = test.line
         at = test.target if test.is_motored else -test.friction.mean

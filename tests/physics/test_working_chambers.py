@@ -1,4 +1,4 @@
-"""Chambers on both sides of pistons: diagrams against a plain model of their own, work, and what symmetry demands."""
+"""Chambers on both sides of pistons, compared with an independent model, work and symmetry."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def engine(*parts: SliderCrank) -> Engine:
 
 
 def plain_pressure(diagram: Steam, x: float, is_out: bool) -> float:
-    """The diagram point by point, in scalars."""
+    """Return the pressure of the diagram point by point, in scalars."""
     c, n = diagram.clearance, diagram.exponent
     if is_out and x < diagram.cut_off:
         return diagram.admission
@@ -63,7 +63,7 @@ def plain_pressure(diagram: Steam, x: float, is_out: bool) -> float:
 
 
 def plain_travel(degrees: float) -> float:
-    """Eq. 285 over the stroke."""
+    """Return the travel of eq. 285 over the stroke."""
     phi, r, l = math.radians(degrees), 0.4, 2.0
     return (r * (1 - math.cos(phi)) + l - math.sqrt(l * l - (r * math.sin(phi)) ** 2)) / (2 * r)
 
@@ -96,7 +96,7 @@ def test_work_of_a_turn_is_that_of_the_diagrams() -> None:
 
 
 def test_orders_follow_the_torque_point_by_point() -> None:
-    """Corners are taken out before the transform, so that the sum of orders meets the diagram everywhere."""
+    """Check that the sum of orders, with corners treated apart, meets the diagram everywhere."""
     load = gas_loads(engine(PART), DOUBLE)
     for degrees in (3.0, 57.0, 120.0, 185.0, 297.0):
         phi, x = math.radians(degrees), plain_travel(degrees)
@@ -119,7 +119,7 @@ def test_a_trace_of_the_diagram_is_the_diagram() -> None:
 
 
 def test_ends_of_a_scotch_yoke_are_images() -> None:
-    """Without a rod the two ends differ by half a turn and a sign."""
+    """Check that the two ends differ by half a turn and a sign without a rod."""
     yoke = replace(PART, rod_length=math.inf)
     sides = [Chambers((replace(chamber, rod=0.0),), AIR) for chamber in (HEAD, CRANK)]
     head, crank = (gas_torque(side, yoke, Cycle.TWO_STROKE, 720) for side in sides)
@@ -139,7 +139,7 @@ def test_pressure_stays_between_its_ends(cut_off: float, release: float, compres
 
 
 def test_a_reversed_crank_drives_alike() -> None:
-    """The valves follow time: a crank that is geared to run the other way gives the output the same torque."""
+    """Check that a crank geared to run backwards gives the same torque."""
     back = replace(PART, shaft=laufruhe.machine.Shaft("back", -1.0))
     forward, backward = (gas_torque(DOUBLE, part, Cycle.TWO_STROKE, 360) for part in (PART, back))
     assert backward == pytest.approx(forward, abs=1e-9 * np.abs(forward).max())
@@ -219,7 +219,7 @@ steam = { admission = "9 bar", cut_off = 0.3, back_pressure = "1.2 bar" }
     ],
 )
 def test_files_that_contradict_themselves(old: str, new: str, said: str) -> None:
-    """One line each, that names the key."""
+    """Check one line that names the key."""
     with pytest.raises(InputError) as caught:
         laufruhe.load(FILE.replace(old, new, 1))
     assert said in str(caught.value)
@@ -233,7 +233,7 @@ COMPRESSOR = {"suction": 1.2e5, "delivery": 7e5, "clearance": 0.07, "exponent": 
 @pytest.mark.parametrize("pressures", [(1e5, 3e5), (1.2e5, 7e5), (30e5, 31e5)])
 @pytest.mark.parametrize("exponent", [1.1, 1.4])
 def test_work_of_a_compressor_in_closed_form(end: str, pressures: tuple[float, float], exponent: float) -> None:
-    """G17b: n / (n - 1) p_s eta V (r^((n - 1) / n) - 1) a turn, whatever the rod."""
+    """Check G17b, n / (n - 1) p_s eta V (r^((n - 1) / n) - 1) a turn, for any rod."""
     (suction, delivery), c = pressures, 0.07
     diagram = Compressor(suction, delivery, c, exponent)
     ratio = delivery / suction
@@ -247,14 +247,14 @@ def test_work_of_a_compressor_in_closed_form(end: str, pressures: tuple[float, f
 
 
 def test_a_compressor_point_by_point() -> None:
-    """Polytropes between the pressures, in scalars."""
+    """Compare with polytropes between the pressures, in scalars."""
     diagram, c, n = Compressor(**COMPRESSOR), 0.07, 1.25
     chamber = replace(HEAD, diagram=diagram)
     for degrees in (0.5, 5.0, 20.0, 60.0, 170.0, 190.0, 250.0, 300.0, 330.0, 359.0):
         x, is_out = plain_travel(degrees), degrees < 180.0
         expanded, squeezed = 7e5 * (c / (x + c)) ** n, 1.2e5 * ((1 + c) / (x + c)) ** n
-        wanted = max(expanded, 1.2e5) if is_out else min(squeezed, 7e5)
-        assert chamber_pressure(chamber, PART, np.radians([degrees]))[0] == pytest.approx(wanted, rel=1e-7)
+        expected = max(expanded, 1.2e5) if is_out else min(squeezed, 7e5)
+        assert chamber_pressure(chamber, PART, np.radians([degrees]))[0] == pytest.approx(expected, rel=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -273,7 +273,7 @@ def test_compressors_that_cannot_be(change: dict[str, float], said: str) -> None
 
 
 def test_equal_pistons_of_the_ready_compressor_leave_no_first_order() -> None:
-    """A vee of 90 degrees: with the mass of the first piston in the second, m r at the crank balances order one."""
+    """Check that a 90-degree vee with balanced m r has no order 1."""
     problem = laufruhe.load("compressor-two-stage")
     first, second = problem.engine.slider_cranks
     (web,) = problem.engine.rotors

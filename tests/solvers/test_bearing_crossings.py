@@ -1,4 +1,4 @@
-"""Bearings crossed with what else an engine may have: decided, and no design drawn at random goes under the bound."""
+"""Bearings with further parts of an engine: bounds, compared with random designs."""
 
 from __future__ import annotations
 
@@ -58,17 +58,17 @@ CASES: dict[str, dict[str, Any]] = {
 }
 
 
-def problem_of(told: dict[str, Any], quantity: str) -> Problem:
+def problem_of(changes: dict[str, Any], quantity: str) -> Problem:
     whole = {key: value for key, value in THREE.items() if key != "constraints"}
-    whole |= {"counterweights": WEBS, "fidelity": {"samples": 120}, "objective": {"minimise": quantity}, **told}
+    whole |= {"counterweights": WEBS, "fidelity": {"samples": 120}, "objective": {"minimise": quantity}, **changes}
     return load_tables({key: value for key, value in whole.items() if value is not None}, Path("crossed.toml"))
 
 
 MEAN, MAXIMUM = "mean main-bearing force", "maximum main-bearing pressure"
-ASKED = [(name, quantity) for name in CASES for quantity in (MEAN, MAXIMUM)]
+PAIRS = [(name, quantity) for name in CASES for quantity in (MEAN, MAXIMUM)]
 
 
-@pytest.mark.parametrize(("name", "quantity"), first_fast(ASKED, 0, long=ASKED[1::4] + ASKED[2::4]))
+@pytest.mark.parametrize(("name", "quantity"), first_fast(PAIRS, 0, long=PAIRS[1::4] + PAIRS[2::4]))
 def test_no_design_goes_under_the_bound(name: str, quantity: str) -> None:
     problem = problem_of(CASES[name], quantity)
     result = laufruhe.solve(problem)
@@ -90,9 +90,9 @@ def test_no_design_goes_under_the_bound(name: str, quantity: str) -> None:
 
 
 def test_sizes_of_rods_on_a_master_rod_are_refused_by_name() -> None:
-    told = {**CASES["radial"], "running_gear": {"rod": {"diameter": "30 mm"}}}
+    tables = {**CASES["radial"], "running_gear": {"rod": {"diameter": "30 mm"}}}
     with pytest.raises(InputError, match="hinged to a master rod"):
-        problem_of(told, "maximum rod stress")
+        problem_of(tables, "maximum rod stress")
 
 
 def _shaft(x: Any) -> list[dict[str, Any]]:
@@ -103,17 +103,17 @@ def _shaft(x: Any) -> list[dict[str, Any]]:
 
 @pytest.mark.slow
 def test_places_of_balancer_shafts_beside_bearings() -> None:
-    """Bearings feel no place of a shaft that they do not carry: the optimum of both is the best of a row of places."""
-    told = {
+    """Compare with the best of a row of shaft places, which no bearing force depends on."""
+    tables = {
         "objective": {"terms": [{"quantity": "rms mount force"},
                                 {"quantity": "rms main-bearing force", "weight": 0.1}]},
         "counterweights": WEBS[:2], "tolerance": 1e-3, "gas": None,
     }  # fmt: skip
     open_place = {"between": ["-200 mm", "200 mm"]}
-    found = laufruhe.solve(problem_of({**told, "balancer_shafts": _shaft(open_place)}, ""))
+    found = laufruhe.solve(problem_of({**tables, "balancer_shafts": _shaft(open_place)}, ""))
     assert found.certificate.kind is Proof.GLOBAL
     row = [
-        laufruhe.solve(problem_of({**told, "balancer_shafts": _shaft(f"{x} mm")}, "")) for x in range(-200, 201, 100)
+        laufruhe.solve(problem_of({**tables, "balancer_shafts": _shaft(f"{x} mm")}, "")) for x in range(-200, 201, 100)
     ]
     minimum = min(result.objective.value for result in row)
     assert found.objective.value <= minimum * (1.0 + 1e-3)
@@ -121,10 +121,10 @@ def test_places_of_balancer_shafts_beside_bearings() -> None:
     assert minimum <= 1.05 * found.objective.value
     # of a weight on the crank itself bearings feel the place, along a line between two of them (P20)
     moved = [{**WEBS[0], "x": open_place, "mass": "1 kg"}, *WEBS[1:]]
-    carried = laufruhe.solve(problem_of({**told, "counterweights": moved}, ""))
+    carried = laufruhe.solve(problem_of({**tables, "counterweights": moved}, ""))
     assert carried.certificate.kind is Proof.GLOBAL
     fixed = [
-        laufruhe.solve(problem_of({**told, "counterweights": [{**moved[0], "x": f"{x} mm"}, *moved[1:]]}, ""))
+        laufruhe.solve(problem_of({**tables, "counterweights": [{**moved[0], "x": f"{x} mm"}, *moved[1:]]}, ""))
         for x in (-200, -100, 0, 100, 200)
     ]
     minimum = min(one.objective.value for one in fixed)

@@ -1,4 +1,4 @@
-"""Counterweights decided by what main bearings carry: the optimum against searches of its own, and what is refused."""
+"""Counterweights for main-bearing loads: optima, compared with independent searches, and refused input."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ duration = "60 deg"
 
 
 def web(throw: int, open_: bool = True) -> str:
-    """A counterweight opposite a throw, beside its middle."""
+    """Return a counterweight opposite a throw, beside its middle."""
     mass = '{ between = ["0 kg", "4 kg"] }' if open_ else '"0 kg"'
     x = {1: 150, 2: 20, 3: -140}[throw]
     return (f'[[counterweights]]\nname = "web {throw}"\nx = "{x} mm"\nopposite_throw = {throw}\nradius = "80 mm"\n'
             f"mass = {mass}\n")  # fmt: skip
 
 
-def asked(quantity: str, narrowed: str = "") -> str:
+def minimise(quantity: str, narrowed: str = "") -> str:
     return f'[objective]\nminimise = "{quantity}"\n{narrowed}\n'
 
 
@@ -65,7 +65,7 @@ def read(tmp_path: Path, text: str) -> Problem:
 
 
 def bearings_by_hand(problem: Problem, masses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Force on each bearing over the cycle: the bare crank, and each weight by the lever rule, shape (720, 4, 2)."""
+    """Return the force on each bearing from the bare crank and weights by lever rule, shape (720, 4, 2)."""
     bare = problem.design([0.0] * len(masses))
     given = laufruhe.evaluate(bare, problem.points).final.loads[0]
     force = laufruhe.problem.channels.MAIN_BEARING_FORCE.signal(given).sample(720)[..., 1:]
@@ -91,7 +91,9 @@ NORMS = {
 
 @pytest.mark.parametrize("norm", NORMS)
 def test_no_search_finds_less(tmp_path: Path, norm: str) -> None:
-    problem = read(tmp_path, THREE + WEBS + asked(f"{norm} main-bearing force") + limited("counterweight mass", "4 kg"))
+    problem = read(
+        tmp_path, THREE + WEBS + minimise(f"{norm} main-bearing force") + limited("counterweight mass", "4 kg")
+    )
     result = laufruhe.solve(problem)
     assert result.status == "optimal"
     assert result.certificate is not None
@@ -113,7 +115,7 @@ def test_no_search_finds_less(tmp_path: Path, norm: str) -> None:
 
 def test_price_of_mass_is_what_more_of_it_brings(tmp_path: Path) -> None:
     def solved(maximum: float) -> laufruhe.Result:
-        text = THREE + WEBS + asked("mean main-bearing force") + limited("counterweight mass", f"{maximum} kg")
+        text = THREE + WEBS + minimise("mean main-bearing force") + limited("counterweight mass", f"{maximum} kg")
         return laufruhe.solve(read(tmp_path, text + "\n"))
 
     low, middle, high = (solved(maximum) for maximum in (3.9, 4.0, 4.1))
@@ -126,7 +128,7 @@ def test_more_freedom_is_never_worse(tmp_path: Path) -> None:
     values = []
     for text in (web(1) + web(2, open_=False) + web(3, open_=False), web(1) + web(2) + web(3, open_=False), WEBS):
         values.append(
-            laufruhe.solve(read(tmp_path, THREE + text + asked("maximum main-bearing force"))).objective.value
+            laufruhe.solve(read(tmp_path, THREE + text + minimise("maximum main-bearing force"))).objective.value
         )
     assert values[0] >= values[1] * (1.0 - 1e-4)
     assert values[1] >= values[2] * (1.0 - 1e-4)
@@ -134,13 +136,13 @@ def test_more_freedom_is_never_worse(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_mounts_and_bearings_limit_each_other(tmp_path: Path) -> None:
-    """Least bearing force under a mount force, and least mount force under that bearing force, are one design's."""
+    """Check that each force, least under a limit on the other, gives the same design."""
     near = "tolerance = 1e-3\n" + THREE + MOUNTS + WEBS
     first = laufruhe.solve(
-        read(tmp_path, near + asked("mean main-bearing force") + limited("mean mount force", "600 N"))
+        read(tmp_path, near + minimise("mean main-bearing force") + limited("mean mount force", "600 N"))
     )
     maximum = first.objective.value
-    text = near + asked("mean mount force") + limited("mean main-bearing force", f"{maximum} N")
+    text = near + minimise("mean mount force") + limited("mean main-bearing force", f"{maximum} N")
     second = laufruhe.solve(read(tmp_path, text))
     assert first.limits[0].active
     assert second.objective.value == pytest.approx(first.limits[0].value, rel=3e-4)
@@ -148,16 +150,16 @@ def test_mounts_and_bearings_limit_each_other(tmp_path: Path) -> None:
 
 def test_pressure_is_force_over_area(tmp_path: Path) -> None:
     force, pressure = (
-        laufruhe.solve(read(tmp_path, THREE + WEBS + asked(f"maximum main-bearing {what}"))).objective.value
+        laufruhe.solve(read(tmp_path, THREE + WEBS + minimise(f"maximum main-bearing {what}"))).objective.value
         for what in ("force", "pressure")
     )
     assert pressure == pytest.approx(force / (0.070 * 0.030), rel=1e-4)
 
 
 def test_friction_power_is_what_the_bearings_lose_in_sum(tmp_path: Path) -> None:
-    """mu |F| v of every bearing, by hand, added up (B7); one bearing alone is its share, and less mass costs more."""
+    """Compare with mu |F| v summed by hand (B7), for all bearings, one, and less mass."""
     rubbing = THREE.replace('width = "30 mm"', 'width = "30 mm"\nfriction = 0.012')
-    problem = read(tmp_path, rubbing + WEBS + asked("mean friction power") + limited("counterweight mass", "4 kg"))
+    problem = read(tmp_path, rubbing + WEBS + minimise("mean friction power") + limited("counterweight mass", "4 kg"))
     result = laufruhe.solve(problem)
     forces = bearings_by_hand(problem, np.array([d.value for d in result.decisions]))
     lost = 0.012 * 0.035 * problem.points[0].speed * np.linalg.norm(forces, axis=-1).mean(axis=0)
@@ -167,21 +169,21 @@ def test_friction_power_is_what_the_bearings_lose_in_sum(tmp_path: Path) -> None
     assert [one["mean"] for one in as_dict(result)["friction"]] == pytest.approx(lost.tolist(), rel=2e-4)
     # one coefficient and one diameter for all: the design of least mean force
     force = laufruhe.solve(
-        read(tmp_path, THREE + WEBS + asked("mean main-bearing force") + limited("counterweight mass", "4 kg"))
+        read(tmp_path, THREE + WEBS + minimise("mean main-bearing force") + limited("counterweight mass", "4 kg"))
     )
     assert force.objective.value * 4 * 0.012 * 0.035 * problem.points[0].speed == pytest.approx(lost.sum(), rel=2e-4)
-    alone = read(tmp_path, rubbing + WEBS + asked("mean friction power", 'bearings = ["2"]'))
+    alone = read(tmp_path, rubbing + WEBS + minimise("mean friction power", 'bearings = ["2"]'))
     measure = alone.objective[0].measure
     assert result.final.value(measure) == pytest.approx(lost[1], rel=2e-4)
     with pytest.raises(InputError, match=r"objective\.alternating.*means nothing for .*; leave it out"):
-        read(tmp_path, rubbing + WEBS + asked("mean friction power", "alternating = true"))
+        read(tmp_path, rubbing + WEBS + minimise("mean friction power", "alternating = true"))
     assert with_loads(alone, alternating=True).objective == alone.objective
 
 
 @pytest.mark.slow
-def test_a_weight_that_bearings_feel_is_placed_along_the_crank(tmp_path: Path) -> None:
-    """As good as the best of a row of places, each with its weights proven."""
-    text = THREE + WEBS + asked("mean main-bearing force")
+def test_a_weight_is_placed_along_the_crank_for_bearings(tmp_path: Path) -> None:
+    """Compare with the best of six places, each with proven weights."""
+    text = THREE + WEBS + minimise("mean main-bearing force")
     found = laufruhe.solve(read(tmp_path, text.replace('x = "150 mm"', 'x = { between = ["100 mm", "150 mm"] }')))
     assert found.certificate.kind == "global"
     row = (read(tmp_path, text.replace('x = "150 mm"', f'x = "{x} mm"')) for x in (100, 110, 120, 130, 140, 150))
@@ -204,7 +206,7 @@ def test_a_weight_that_bearings_feel_is_placed_along_the_crank(tmp_path: Path) -
     ],
 )  # fmt: skip
 def test_one_line_for_what_is_wrong(tmp_path: Path, change: tuple[str, str], line: str) -> None:
-    text = (THREE + WEBS + asked("mean main-bearing force")).replace(*change)
+    text = (THREE + WEBS + minimise("mean main-bearing force")).replace(*change)
     with pytest.raises(InputError, match=line):
         read(tmp_path, text)
 

@@ -1,4 +1,4 @@
-"""The flywheel that a degree of irregularity needs: proven by boxes, against brute force and by its properties."""
+"""Flywheel for a degree of irregularity, proven by boxes, compared with brute force and its properties."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_the_least_inertia_has_its_degree_and_is_shown_from_both_sides(tmp_path:
 
 @pytest.mark.slow
 def test_permitted_degrees_of_the_textbook_need_inertias_in_inverse_proportion(tmp_path: Path) -> None:
-    """Textbook, section 2.7: the table of the how-to page; eq. 25, E = J w^2 delta, exact for small delta."""
+    """Check the textbook's table (2.7) and eq. 25, E = J w^2 delta, for small delta."""
     page = (PROBLEMS.parent / "docs/how-to/flywheel.md").read_text(encoding="utf-8")
     degrees = re.findall(r"^\| .* \| `(1/\d+)` \|$", page, re.MULTILINE)
     inertia = changed(INERTIA, "40 kg m^2", "400 kg m^2")
@@ -119,7 +119,7 @@ def test_permitted_degrees_of_the_textbook_need_inertias_in_inverse_proportion(t
 
 @pytest.mark.slow
 def test_a_rim_is_the_best_of_a_grid(tmp_path: Path) -> None:
-    """Of 60 x 60 sections and diameters with the width that keeps the degree none is lighter."""
+    """Check that none of 60 x 60 sections and diameters, each with the needed width, is lighter."""
     limits = '[[constraints]]\nlimit = "rim stress"\nmax = "18 N/mm^2"\n'
     problem = loaded(tmp_path, SINGLE + RIM + changed(LEAST, "flywheel inertia", "flywheel mass") + limits)
     result = proven(problem)
@@ -140,7 +140,7 @@ def test_a_rim_is_the_best_of_a_grid(tmp_path: Path) -> None:
 
 
 def test_boxes_of_a_rim_are_of_its_mass_in_place_of_its_width(tmp_path: Path) -> None:
-    """A rim of mean diameter D, width w and height h weighs pi rho D w h; every point is one flywheel, and back."""
+    """Check the mass pi rho D w h of a rim, from the point of a box and back."""
     limits = '[[constraints]]\nlimit = "rim stress"\nmax = "18 N/mm^2"\n'
     minimum = changed(LEAST, "flywheel inertia", "flywheel mass")
     problem = loaded(tmp_path, changed(SINGLE, "samples = 360", "samples = 72") + RIM + minimum + limits)
@@ -163,15 +163,15 @@ def test_boxes_of_a_rim_are_of_its_mass_in_place_of_its_width(tmp_path: Path) ->
         assert boxes.decisions(point) == pytest.approx(values, rel=1e-12)
         assert with_mass.value(point) == pytest.approx(with_width.value(values), rel=1e-12)
         (width,) = (x for x, name in zip(values, names, strict=True) if name == "width")
-        told = [number.value(point) for _, number in with_mass.limits]
-        assert told == pytest.approx([*(number.value(values) for _, number in with_width.limits), width, -width])
+        numbers = [number.value(point) for _, number in with_mass.limits]
+        assert numbers == pytest.approx([*(number.value(values) for _, number in with_width.limits), width, -width])
     alone = loaded(tmp_path, SINGLE + INERTIA + LEAST)
     assert _Coordinates.from_problem(alone, True).width is None
 
 
 @pytest.mark.slow
 def test_a_sum_of_inertia_and_degree_is_proven(tmp_path: Path) -> None:
-    """One rises and the other falls: brute force finds nothing under the bound, and no better design."""
+    """Check by brute force that no inertia gives less than the bound or a better sum."""
     degree = '{ quantity = "degree of irregularity", weight = 500 }'
     terms = f'[objective]\nterms = [{degree}, {{ quantity = "flywheel inertia" }}]\n'
     problem = loaded(tmp_path, SINGLE + INERTIA + terms)
@@ -192,7 +192,7 @@ def test_a_degree_is_minimised_at_the_largest_flywheel_allowed(tmp_path: Path) -
     assert result.limits[0].shadow_price > 0.0
 
 
-def test_a_flywheel_that_cannot_reach_the_degree_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_flywheel_too_small_for_the_degree_is_infeasible(tmp_path: Path) -> None:
     small = changed(INERTIA, "40 kg", "1 kg")
     result = laufruhe.solve(loaded(tmp_path, SINGLE + small + LEAST))
     assert result.status is Status.INFEASIBLE
@@ -206,7 +206,7 @@ def test_a_flywheel_that_cannot_reach_the_degree_is_told_in_one_line(tmp_path: P
 
 @pytest.mark.slow
 def test_the_worked_diesel_gets_the_flywheel_that_it_was_given(diesel: laufruhe.solvers.Result) -> None:
-    """70 hp diesel, part E: 1:60, rim of 300 by 195 mm and 4850 kg under 3.5 m, 6330 kg in all, from a coefficient."""
+    """Check a 70 hp diesel, part E: 1:60, rim of 300 by 195 mm, 4850 kg of 6330 kg."""
     assert diesel.certificate is not None
     assert diesel.certificate.kind is Proof.GLOBAL
     wheel = diesel.final.engine.flywheel
@@ -256,7 +256,7 @@ def test_bad_flywheels_are_refused(text: str, where: str, rule: str, tmp_path: P
     assert "\n" not in str(refused.value)
 
 
-def test_what_a_flywheel_is_asked_without_having_it(tmp_path: Path) -> None:
+def test_quantities_of_a_missing_flywheel_are_refused(tmp_path: Path) -> None:
     for name, text, rule in (
         ("degree of irregularity", "", "needs a flywheel"),
         ("flywheel mass", INERTIA, "needs the rim"),
@@ -266,20 +266,20 @@ def test_what_a_flywheel_is_asked_without_having_it(tmp_path: Path) -> None:
             loaded(tmp_path, SINGLE + text + f'[objective]\nminimise = "{name}"\n')
 
 
-def test_an_inertia_is_told_once_and_serves_both(tmp_path: Path) -> None:
-    """With that of an uneven speed the degree is a quantity too; beside a flywheel it is refused."""
+def test_the_inertia_of_an_uneven_speed_gives_the_degree(tmp_path: Path) -> None:
+    """Check that the inertia of an uneven speed gives the degree, and is refused with a flywheel."""
     uneven = changed(SINGLE, "samples = 360", 'samples = 360\ncrank_inertia = "1 kg m^2"')
     degree = '[[constraints]]\nlimit = "degree of irregularity"\nmax = "1/10"\noperating_points = ["rated"]\n'
     problem = loaded(tmp_path, uneven + '[objective]\nminimise = "maximum shaking force"\n' + degree)
     assert problem.engine.flywheel == Flywheel(1.0)
-    told = laufruhe.solve(problem).limits[0].value
-    assert told == pytest.approx(irregularity(problem.engine, problem.points[0], 1.0, problem.fidelity))
+    irregularity_value = laufruhe.solve(problem).limits[0].value
+    assert irregularity_value == pytest.approx(irregularity(problem.engine, problem.points[0], 1.0, problem.fidelity))
     with pytest.raises(InputError, match="given by"):
         loaded(tmp_path, uneven + INERTIA + LEAST)
 
 
 def test_a_flywheel_beside_counterweights_is_the_sum_of_both(tmp_path: Path) -> None:
-    """At an even speed neither feels the other: value, bound and prices are those of each alone."""
+    """Check that value, bound and prices at even speed are those of each alone."""
     size = 'mass = { between = ["0 kg", "2 kg"] }'
     web = f'[[counterweights]]\nname = "web"\nradius = "80 mm"\nopposite_throw = 1\n{size}\n'
     mass = '[[constraints]]\nlimit = "counterweight mass"\nmax = "0.3 kg"\n'
@@ -310,7 +310,7 @@ def test_a_flywheel_beside_counterweights_is_the_sum_of_both(tmp_path: Path) -> 
 
 
 def test_objectives_in_order_decide_a_flywheel_and_a_counterweight_apart(tmp_path: Path) -> None:
-    """Neither order changes the optimum of either; a number that no objective needs is refused by `check` too."""
+    """Check that both orders give the same optima, and that unneeded numbers are refused."""
     size = 'radius = "80 mm"\nopposite_throw = 1\nmass = { between = ["0 kg", "2 kg"] }'
     web = f'[[counterweights]]\nname = "web"\n{size}\n'
     force = '[[objective]]\nminimise = "maximum shaking force"\n'
@@ -330,7 +330,7 @@ def test_objectives_in_order_decide_a_flywheel_and_a_counterweight_apart(tmp_pat
 
 
 def test_a_flywheel_beside_an_open_crank_is_that_of_each_crank(tmp_path: Path) -> None:
-    """All even cranks of equal cylinders turn as evenly."""
+    """Compare with a given even crank, because all turn as evenly."""
     text = changed(SINGLE, "throws = [0]", 'cylinders = 3\ncylinder_spacing = "120 mm"\nthrows = "open"')
     both = laufruhe.solve(loaded(tmp_path, text + INERTIA + LEAST))
     crank = changed(text, 'throws = "open"', "throws = [0, 120, 240]\nfiring_order = [1, 2, 3]")
@@ -339,8 +339,8 @@ def test_a_flywheel_beside_an_open_crank_is_that_of_each_crank(tmp_path: Path) -
     )
 
 
-def test_what_a_flywheel_needs_is_told_and_nothing_traded_for_it() -> None:
-    """Gas and speed enter, orders of two and more do not; a cheap model would make a wheel that breaks its limits."""
+def test_needed_physics_of_a_flywheel_and_no_trade() -> None:
+    """Check that gas and speed are needed, and that a trade of fidelities is refused."""
     path = PROBLEMS / "diesel-70-hp-flywheel.toml"
     text, _ = explained(path, 1e-3)
     assert "gas: without" in text
@@ -351,7 +351,7 @@ def test_what_a_flywheel_needs_is_told_and_nothing_traded_for_it() -> None:
 
 @pytest.mark.slow
 def test_two_machines_on_one_shaft_are_best_half_a_turn_apart() -> None:
-    """The same engines: the least flywheel is even in the angle between their cranks, and least half a turn apart."""
+    """Check that the least flywheel is even in the angle between equal engines, least at half a turn."""
     tables = tables_of(PROBLEMS / "two-machines.toml")
 
     def minimum(angle: float) -> float:
@@ -370,23 +370,23 @@ def test_two_machines_on_one_shaft_are_best_half_a_turn_apart() -> None:
 
 
 def test_every_even_star_of_equal_cylinders_stores_the_same(tmp_path: Path) -> None:
-    """Ranked with proof, and all alike; the degree itself is one for all, refused by name beside an open flywheel."""
+    """Check equal ranked stars, and that the degree beside an open flywheel is refused."""
     text = changed(SINGLE, "throws = [0]", 'cylinders = 4\ncylinder_spacing = "120 mm"\nthrows = "open"')
     result = proven(loaded(tmp_path, text + '[objective]\nminimise = "peak to peak stored work"\n'))
     assert len(result.phasing.ranking) > 2
     assert [star.value for star in result.phasing.ranking] == pytest.approx([result.objective.value] * 3, rel=1e-3)
     fixed = changed(INERTIA, '{ between = ["0.05 kg m^2", "40 kg m^2"] }', '"1 kg m^2"')
-    wanted = '[objective]\nminimise = "degree of irregularity"\n'
-    problem = loaded(tmp_path, text + fixed + wanted)
+    objective = '[objective]\nminimise = "degree of irregularity"\n'
+    problem = loaded(tmp_path, text + fixed + objective)
     degrees = [irregularity(problem.engine, point, 1.0, problem.fidelity) for point in problem.points]
     assert proven(problem).objective.value == pytest.approx(max(degrees), rel=1e-9)
-    wheel = laufruhe.solve(loaded(tmp_path, text + INERTIA + wanted))
+    wheel = laufruhe.solve(loaded(tmp_path, text + INERTIA + objective))
     assert wheel.final.engine.flywheel.inertia == pytest.approx(40.0, rel=1e-6)
 
 
 @pytest.mark.slow
-def test_what_steps_miss_of_the_degree_is_told() -> None:
-    """Of what is minimised and of what is limited: no less than what ten thousand steps change."""
+def test_the_error_estimate_of_the_degree_is_not_exceeded() -> None:
+    """Check that error estimates of objective and limit are at least the true error."""
     text = SINGLE + '[flywheel]\ninertia = "2 kg m^2"\n[objective]\nminimise = "degree of irregularity"\n'
     text += '[[constraints]]\nlimit = "degree of irregularity"\nmax = 1.9\n'
 

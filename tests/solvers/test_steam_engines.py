@@ -1,4 +1,4 @@
-"""Ready steam engines and locomotives: proven, and against every angle or weight tried one by one."""
+"""Ready steam engines and locomotives, compared with every angle or weight one by one."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def two_crank() -> Result:
 
 
 def test_angle_between_the_cranks_is_the_best_of_all(two_crank: Result) -> None:
-    """The torque of one crank twice, shifted through a turn: no angle between 30 and 150 degrees is better."""
+    """Compare with the torque of one crank twice, shifted by angles from 30 to 150 degrees."""
     problem = two_crank.problem
     assert two_crank.certificate.kind == "global"
     engine = two_crank.final.engine
@@ -55,7 +55,7 @@ def test_flywheel_of_the_waterworks_engine() -> None:
 
 
 def test_flywheel_of_the_scotch_yoke_pump() -> None:
-    """Speed over a turn from the energy of flywheel and yoke and the work of the chambers, in plain steps."""
+    """Compare speed over a turn with the energy of flywheel, yoke and chambers in plain steps."""
     result = solved("scotch-yoke-steam-pump")
     assert result.certificate.kind == "global"
     point = result.problem.points[0]
@@ -73,7 +73,7 @@ def test_flywheel_of_the_scotch_yoke_pump() -> None:
 
 
 def test_weight_of_kleins_drive() -> None:
-    """No weight tried one by one on a grid about the best is better."""
+    """Check that no weight on a grid about the best is better."""
     result = solved("klein-steam-pump")
     assert result.certificate.kind == "global"
     point, mass, radius, rod, pin = result.problem.points[0], 70.0, 0.1, 0.3, 5.0
@@ -90,17 +90,17 @@ def test_weight_of_kleins_drive() -> None:
 
 
 @pytest.mark.parametrize("quantity", ["rms roll moment", "degree of irregularity"])
-def test_stars_are_told_apart_by_chambers_that_some_cylinders_have(quantity: str) -> None:
-    """Two of four cylinders work, the others are driven: neighbours in the star or opposite each other."""
+def test_stars_differ_by_chambers_of_some_cylinders(quantity: str) -> None:
+    """Check two working cylinders of four, adjacent in the star or opposite."""
     steam = {"admission": "9 bar", "cut_off": 0.4, "back_pressure": "1.2 bar", "release": 0.93, "compression": 0.15}
     power = {"cylinders": [1, 2], "end": "head", "bore": "90 mm", "steam": {**steam, "clearance": 0.06}}
 
     def problem(**throws: Any) -> Problem:
         engine = {"layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "bore": "90 mm", "rod_ratio": 0.25}
         engine |= {"reciprocating_mass": "1 kg", "cylinder_spacing": "110 mm", **throws}
-        told = {"title": "Half a steam engine", "engine": engine, "operating_points": [{"speed": "600 rpm"}]}
-        told |= {"gas": {"model": "chambers", "chambers": [power]}, "flywheel": {"inertia": "20 kg m^2"}}
-        return load_tables({**told, "objective": {"minimise": quantity}}, Path("half.toml"))
+        tables = {"title": "Half a steam engine", "engine": engine, "operating_points": [{"speed": "600 rpm"}]}
+        tables |= {"gas": {"model": "chambers", "chambers": [power]}, "flywheel": {"inertia": "20 kg m^2"}}
+        return load_tables({**tables, "objective": {"minimise": quantity}}, Path("half.toml"))
 
     stars = [problem(throws=[0, *rest]) for rest in itertools.permutations((90, 180, 270))]
     values = [objective_value(star, evaluate(star)) for star in stars]

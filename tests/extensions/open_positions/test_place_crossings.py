@@ -1,4 +1,4 @@
-"""Open places beside bearings, sizes and leads: bounds against an independent model (P20)."""
+"""Open places with bearings, sizes and leads: bounds, compared with an independent model (P20)."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DRAWN = {
 
 
 def _narrowed(value: Any, rng: np.random.Generator, width: float) -> Any:
-    """Replace the bounds of every open place by a part of them, a share of them wide."""
+    """Narrow every open place to a share of its bounds."""
     if isinstance(value, list):
         return [_narrowed(each, rng, width) for each in value]
     if not isinstance(value, dict):
@@ -52,7 +52,7 @@ def _drawn(kind: str, seed: int, width: float) -> tuple[dict[str, Any], np.rando
 
 
 def _bound(problem: Problem) -> float:
-    """Return the bound of all places within their bounds, by whatever decides what else is open."""
+    """Return the bound of all places within their bounds, with the method of the other open numbers."""
     relaxed = without_places(problem)
     method = next(each for each in METHODS if each.suits(relaxed))
     result = method.solve(relaxed)
@@ -70,7 +70,7 @@ def _loaded(table: dict[str, Any], folder: Path) -> Problem:
 @pytest.mark.parametrize("width", [1.0, 0.3, 1e-5])
 @pytest.mark.parametrize("kind", DRAWN)
 def test_no_design_of_a_box_goes_under_its_bound(kind: str, width: float, seed: int, tmp_path: Path) -> None:
-    """Designs are evaluated by a model that shares nothing with the package."""
+    """Compare bounds with designs of a model that shares nothing with the package."""
     table, rng = _drawn(kind, seed, width)
     bound = _bound(_loaded(table, tmp_path))
     openings = Openings(table)
@@ -81,7 +81,7 @@ def test_no_design_of_a_box_goes_under_its_bound(kind: str, width: float, seed: 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["bearings", "sizes"])
 def test_places_in_narrow_bounds_have_a_tight_bound(kind: str, tmp_path: Path) -> None:
-    """A place that hardly moves leaves the relaxation nothing to relax: its bound is the optimum."""
+    """Check that the bound of a place that hardly moves is the optimum."""
     table, _ = _drawn(kind, 1, 1e-5)
     found = laufruhe.solve(_loaded({**table, "search": {"boxes": 100, "starts": 2}}, tmp_path))
     assert found.objective is not None
@@ -112,10 +112,10 @@ PLACE = {"between": ["-150 mm", "150 mm"]}
 @pytest.mark.parametrize("mass", ["0.6 kg", {"between": ["0.2 kg", "1 kg"]}], ids=["given", "open"])
 @pytest.mark.slow
 def test_the_best_place_is_that_of_a_row_of_places(measure: str, mass: Any, tmp_path: Path) -> None:
-    told = {**_carried(PLACE, mass), "objective": {"minimise": measure}, "fidelity": {"samples": 180}}
-    found = laufruhe.solve(_loaded(told, tmp_path))
+    tables = {**_carried(PLACE, mass), "objective": {"minimise": measure}, "fidelity": {"samples": 180}}
+    found = laufruhe.solve(_loaded(tables, tmp_path))
     assert found.certificate.kind is Proof.GLOBAL
-    problem = _loaded(told, tmp_path)
+    problem = _loaded(tables, tmp_path)
     masses = [number(mass)] if isinstance(mass, str) else np.linspace(0.2, 1.0, 5).tolist()
     row = []
     for x in np.linspace(-0.15, 0.15, 31):
@@ -133,9 +133,9 @@ def _value(decision: Any, x: float, mass: float) -> complex | float:
 
 @pytest.mark.slow
 def test_a_bound_that_knows_no_bearing_is_false(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without corners at the middle bearing its load is that of the outer ones: a false bound."""
-    told = {**_carried(PLACE, "0.6 kg"), "objective": {"minimise": "maximum main-bearing force"}}
-    problem = _loaded({**told, "fidelity": {"samples": 180}}, tmp_path)
+    """Check that a bound without corners at the middle bearing is false."""
+    tables = {**_carried(PLACE, "0.6 kg"), "objective": {"minimise": "maximum main-bearing force"}}
+    problem = _loaded({**tables, "fidelity": {"samples": 180}}, tmp_path)
     whole = _bound(problem)
     initialise = Relaxation.__init__
 
@@ -152,8 +152,8 @@ def test_a_bound_that_knows_no_bearing_is_false(tmp_path: Path, monkeypatch: pyt
 
 
 def test_a_beam_is_not_taken_for_a_shaft_that_is_cut(tmp_path: Path) -> None:
-    told = {**_carried(PLACE, "0.6 kg"), "objective": {"minimise": "maximum main-bearing force"}}
-    beam = _loaded({**told, "fidelity": {"samples": 60, "crankshaft": "beam"}}, tmp_path)
-    cut = _loaded({**told, "fidelity": {"samples": 60}}, tmp_path)
+    tables = {**_carried(PLACE, "0.6 kg"), "objective": {"minimise": "maximum main-bearing force"}}
+    beam = _loaded({**tables, "fidelity": {"samples": 60, "crankshaft": "beam"}}, tmp_path)
+    cut = _loaded({**tables, "fidelity": {"samples": 60}}, tmp_path)
     assert not any(method.suits(beam) for method in METHODS[:-1])
     assert any(method.suits(cut) for method in METHODS[:-1])

@@ -1,4 +1,4 @@
-"""Places of unbalances: against another search, against closed forms, and in what must hold whatever the engine."""
+"""Places of unbalances, compared with another search, closed forms and invariants."""
 
 from __future__ import annotations
 
@@ -67,18 +67,18 @@ def _problem(tmp_path: Path, text: str) -> Problem:
     return laufruhe.load(path)
 
 
-def _engine(throws: list[int] | None = None, load: str = "mount force", norm: str = "mean", **told: Any) -> str:
-    told = {"rod": 0.28, "speed": 2400.0, **told}
-    return ENGINE.format(throws=throws or [0], load=load, norm=norm, **told)
+def _engine(throws: list[int] | None = None, load: str = "mount force", norm: str = "mean", **numbers: Any) -> str:
+    numbers = {"rod": 0.28, "speed": 2400.0, **numbers}
+    return ENGINE.format(throws=throws or [0], load=load, norm=norm, **numbers)
 
 
-def _shaft(**told: str) -> str:
+def _shaft(**keys: str) -> str:
     given = {"ratio": "-1", "y": '"0 mm"', "z": '"0 mm"', "x": '"0 mm"', "unbalance": '"0.02 kg m"', "angle": "180"}
-    return SHAFT.format(**{"name": "shaft", **given, **told})
+    return SHAFT.format(**{"name": "shaft", **given, **keys})
 
 
 def _searched(problem: Problem, seed: int, samples: int | None, starts: int = 6, penalty: float = 10.0) -> float:
-    """Least objective that a search of the exact model finds from several starts, penalties on what is forbidden."""
+    """Return the least objective of a penalised search of the exact model from several starts."""
     generator = np.random.default_rng(seed)
     sets = [decision.set for decision in problem.decisions]
     low = np.concatenate([[s.lower] if s.width == 1 else [0.0, s.angles[0]] for s in sets])
@@ -102,7 +102,7 @@ def _searched(problem: Problem, seed: int, samples: int | None, starts: int = 6,
 class TestAgainstClosedForms:
     @pytest.mark.parametrize("reach", [200.0, 60.0])
     def test_a_given_shaft_goes_where_its_couple_cancels_another(self, reach: float, tmp_path: Path) -> None:
-        """Two opposite throws a apart make the couple of one shaft's two weights at b where m r a = U b (eq. 8).
+        """Check m r a = U b (eq. 8) of two opposite throws and the two weights of a shaft.
 
         Loads are affine in such places: one box proves the optimum, at b or at the nearest end.
         """
@@ -129,7 +129,7 @@ class TestAgainstClosedForms:
         assert "over 1 box of" in result.certificate.method
 
     def test_heights_turn_against_the_second_order(self) -> None:
-        """Shafts of unequal height save what shafts side by side cannot."""
+        """Check that shafts of unequal height save force that shafts side by side cannot."""
         problem = laufruhe.load(HEIGHTS)
         result = laufruhe.solve(problem)
         assert result.certificate is not None
@@ -159,13 +159,13 @@ LOADS = ("mount force", "rocking couple", "roll moment")
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("case", CASES)
 def test_no_search_finds_better(case: str, load: str, tmp_path: Path) -> None:
-    """No design that a search of the exact model finds goes under the bound, or far under the design."""
+    """Check that no design of a search by the exact model is below the bound, or far below the design."""
     seed = LOADS.index(load) * len(CASES) + list(CASES).index(case)
     generator = np.random.default_rng(seed)
     throws = [[0], [0, 180], [0, 120, 240]][seed % 3]
     norm = ("mean", "rms")[seed % 2]
-    told = {"rod": generator.uniform(0.2, 0.33), "speed": generator.uniform(1500, 4000)}
-    problem = _problem(tmp_path, _engine(throws, load=load, norm=norm, **told) + _shaft(**CASES[case]))
+    numbers = {"rod": generator.uniform(0.2, 0.33), "speed": generator.uniform(1500, 4000)}
+    problem = _problem(tmp_path, _engine(throws, load=load, norm=norm, **numbers) + _shaft(**CASES[case]))
     result = laufruhe.solve(problem)
     assert result.certificate is not None
     assert result.objective is not None
@@ -177,7 +177,7 @@ def test_no_search_finds_better(case: str, load: str, tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("small_trade")
 def test_a_trade_decides_places_too(tmp_path: Path) -> None:
-    """Every fidelity of a trade is solved as the problem is: more physics left out, no better design."""
+    """Check that a trade solves each fidelity, and that less physics gives no better design."""
     text = _engine([0, 180]) + _shaft(x=_between(-200, 50), unbalance=_between(0.0, 0.03, " kg m"))
     problem = _problem(tmp_path, text)
     traded, result = trade(problem), laufruhe.solve(problem)
@@ -186,7 +186,7 @@ def test_a_trade_decides_places_too(tmp_path: Path) -> None:
 
 
 def test_masses_are_counted_wherever_they_stand(tmp_path: Path) -> None:
-    """A limit on the mass holds for the unbalance of an open place, and is met with equality where it binds."""
+    """Check that a limit on mass holds with equality for an open place."""
     text = _engine([0, 180]) + _shaft(x=_between(-200, 50), unbalance=_between(0.0, 0.03, " kg m"))
     limit = '[[constraints]]\nlimit = "balancer mass"\nmax = "0.1 kg"\n'
     free, bound = (laufruhe.solve(_problem(tmp_path, each)) for each in (text, text + limit))
@@ -203,7 +203,7 @@ def test_masses_are_counted_wherever_they_stand(tmp_path: Path) -> None:
 
 
 def test_more_room_is_never_worse(tmp_path: Path) -> None:
-    """Wider bounds of a place hold every design of narrower ones."""
+    """Check that wider bounds of a place give no worse optimum."""
     text = _engine([0, 180])
     found = []
     for reach in (0.0, 40.0, 120.0):
@@ -217,7 +217,7 @@ def test_more_room_is_never_worse(tmp_path: Path) -> None:
 
 
 def test_limits_that_no_place_keeps(tmp_path: Path) -> None:
-    """No design is claimed where none keeps the limits, and their names are told."""
+    """Check that no design is claimed, and that the limits are named."""
     text = _engine([0]) + _shaft(z=_between(-100, 100), unbalance=_between(0, 0.001, " kg m"))
     text += '[[constraints]]\nlimit = "mean shaking force"\nmax = "1 N"\n'
     result = laufruhe.solve(_problem(tmp_path, text))
@@ -233,14 +233,14 @@ def test_limits_that_no_place_keeps(tmp_path: Path) -> None:
         pytest.param(_shaft(x="{ between = [1, 2] }"), id="without a unit"),
     ],
 )
-def test_what_makes_no_sense_is_refused(change: str, tmp_path: Path) -> None:
-    """By the file that says it, in one line."""
+def test_meaningless_shafts_are_refused(change: str, tmp_path: Path) -> None:
+    """Check that the reader refuses meaningless shafts."""
     with pytest.raises(InputError):
         _problem(tmp_path, _engine() + change)
 
 
 def test_an_open_crank_beside_places_is_decided_star_by_star(tmp_path: Path) -> None:
-    """As well as with each crank given."""
+    """Compare with each crank given."""
     text = _engine([0, 120, 240]) + _shaft(x=_between(-10, 10))
     both = laufruhe.solve(_problem(tmp_path, text.replace("throws = [0, 120, 240]", 'cylinders = 3\nthrows = "open"')))
     each = [
@@ -269,7 +269,7 @@ def _enveloped(limit: str, shafts: int) -> str:
 
 @pytest.mark.parametrize("case", LIMITS)
 def test_limits_on_distances_hold_and_are_proven(case: str, tmp_path: Path) -> None:
-    """The limit binds and is kept, and no search of the exact model under it goes under the bound."""
+    """Check that the limit is active, and that no search of the exact model is below the bound."""
     limit, shafts = LIMITS[case]
     problem = _problem(tmp_path, _enveloped(limit, shafts))
     free, bound = laufruhe.solve(_problem(tmp_path, _enveloped("", shafts))), laufruhe.solve(problem)
@@ -287,7 +287,7 @@ def test_limits_on_distances_hold_and_are_proven(case: str, tmp_path: Path) -> N
 
 @pytest.mark.parametrize("side", [0, 1])
 def test_a_box_is_cut_where_its_program_leaves_most_out(side: int, tmp_path: Path) -> None:
-    """Its halves cover it, each with the best design in its middle, where one may be better than what is known."""
+    """Check that the halves cover the box, each with its best design, where one may be better."""
     problem = _problem(tmp_path, _enveloped("", 1) + "[fidelity]\nsamples = 72\n")
     search = PlaceSearch(problem)
     lower, upper = search.bounds
@@ -318,7 +318,7 @@ def test_a_box_is_cut_where_its_program_leaves_most_out(side: int, tmp_path: Pat
     ids=["distance", "envelope"],
 )
 def test_a_limit_on_a_distance_costs_what_its_shaft_would_gain(limit: str, low: float, tmp_path: Path) -> None:
-    """On a shaft over the crank: the slope of the objective over its height, by the exact model."""
+    """Compare the price with the slope of the objective over the height of a shaft."""
     shaft = _shaft(ratio="-2", z=_between(low, 150), unbalance='"0.01 kg m"')
     problem = _problem(tmp_path, _engine([0, 180, 180, 0], load="roll moment") + shaft + f"[[constraints]]\n{limit}\n")
 
@@ -336,10 +336,10 @@ def test_a_limit_on_a_distance_costs_what_its_shaft_would_gain(limit: str, low: 
 
 
 def test_distances_by_hand(tmp_path: Path) -> None:
-    """Axes at (y, z) and the crankshaft; weights sweep 30 mm, throws 45 mm."""
+    """Check axes at (y, z) and the crankshaft; weights sweep 30 mm, throws 45 mm."""
     text = _engine() + _shaft(y='"30 mm"', z='"-40 mm"') + _shaft(name="other", y='"-50 mm"', z='"-40 mm"')
-    for asked in ('"shaft distance"\nof = ["shaft"]', '"shaft clearance"\nof = ["shaft"]', '"shaft distance"'):
-        text += f'[[constraints]]\nlimit = {asked}\nmin = "0 mm"\n'
+    for quantity in ('"shaft distance"\nof = ["shaft"]', '"shaft clearance"\nof = ["shaft"]', '"shaft distance"'):
+        text += f'[[constraints]]\nlimit = {quantity}\nmin = "0 mm"\n'
     text += '[[constraints]]\nlimit = "envelope radius"\nof = ["other"]\nmax = "1 m"\n'
     problem = _problem(tmp_path, text)
     given = evaluate(problem)
@@ -351,7 +351,7 @@ def test_distances_by_hand(tmp_path: Path) -> None:
 
 
 def test_distances_that_no_place_keeps(tmp_path: Path) -> None:
-    """Nothing in the row of places is far enough: the limit is named, with places open or given."""
+    """Check that the limit is named, with places open or given."""
     text = _enveloped('name = "room"\nlimit = "shaft distance"\nmin = "300 mm"', 1).replace(AROUND["y"], '"0 mm"')
     for own in (text, text.replace(AROUND["z"], '"90 mm"')):
         result = laufruhe.solve(_problem(tmp_path, own))

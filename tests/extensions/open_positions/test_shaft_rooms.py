@@ -1,4 +1,4 @@
-"""Limits on where shafts stand beside optional shafts: what is left out breaks none, whatever decides the rest."""
+"""Limits on places of optional shafts, which a shaft that is left out does not break."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ LIMITS = {
 @pytest.mark.parametrize("throws", [(0, 180, 180, 0), "open"])
 @pytest.mark.parametrize("name", LIMITS)
 def test_a_shaft_without_room_is_left_out(name: str, throws: Any) -> None:
-    """Half of the force is left where one shaft is built: either does as well, the one that has room is taken."""
+    """Check that of two equal shafts the one with room is built, for half of the force."""
     limit, gone = LIMITS[name]
     result = _solved([limit], throws, time_limit="60 s")
     assert result.certificate is not None
