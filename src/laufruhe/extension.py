@@ -22,7 +22,7 @@ from laufruhe.errors import ModelError
 GROUP = "laufruhe.extensions"
 Tables = Literal[
     "norms", "channels", "kinds", "layouts", "drives", "methods", "quantities", "provers", "reductions", "study_kinds",
-    "commands", "keys", "weight_keys", "notes", "pictures", "sections", "advice",
+    "commands", "keys", "weight_keys", "notes", "pictures", "sections", "advice", "diagnoses",
 ]  # fmt: skip
 
 
@@ -71,6 +71,8 @@ class Extension:
         Objects of `laufruhe.present.pictures.ResultPicture`.
     advice
         Objects of `laufruhe.problem.advice.Advice`: warnings about problems, and remedies for refused files.
+    diagnoses
+        Objects of `laufruhe.solvers.methods.Diagnosis`: completions of results at the end of a solve.
     """
 
     name: str
@@ -92,6 +94,7 @@ class Extension:
     sections: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
     advice: tuple[str, ...] = ()
+    diagnoses: tuple[str, ...] = ()
 
 
 _OF_SIZES = (
@@ -151,6 +154,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     },
     "weight_keys": {"body": "workshop"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
+    "reductions": {"objectives in order": "objectives_in_order"},
     "norms": {"rmq": "root_mean_quad", "worst mean": "worst_mean"},
     "layouts": {"delta": "delta", "rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker", "rhombic": "rhombic"},

@@ -55,6 +55,7 @@ def words_of(table: Tables, name: str, folder: Path) -> list[str]:
         "commands": (name, text),
         "keys": ("solve", f"{text}\n[{name}]\n"),
         "weight_keys": ("solve", f'{text}\n[[counterweights]]\nname = "w"\n{name} = {{}}\n'),
+        "reductions": ("solve", text.replace("[objective]", '[[objective]]\nminimise = "added mass"\n[[objective]]')),
         "norms": ("solve", re.sub(r"minimise = .*", f'minimise = "{name} mount force"', text)),
         "channels": ("solve", re.sub(r"minimise = .*", f'minimise = "{name}"', text)),
         "notes": ("solve", re.sub(r"reciprocating_mass = .*", f"reciprocating_mass = {mass}", text)),

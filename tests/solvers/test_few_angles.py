@@ -11,14 +11,13 @@ import pytest
 
 import laufruhe
 from lanes import first_fast
+from laufruhe.extensions.attainable_limits.solver import with_attainable_limits
 from laufruhe.files.reader import load_tables
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate, with_fine_sampling
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, evaluate_only, violated_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_infeasible
@@ -157,7 +156,7 @@ def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -
         assert violated_limits(problem.limits, with_fine_sampling(result.final))
         return result
 
-    result = with_attainable_limits(failed, problem, {Kind.UNBALANCE}, 1.0, decide)
+    result = with_attainable_limits(failed, problem, 1.0, decide)
     assert met == [True]
     assert not result.status.has_design
     assert result.nearest is not None

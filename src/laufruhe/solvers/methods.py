@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
 from laufruhe.errors import ModelError, SolverError, optional_libraries, wrong_call
-from laufruhe.extension import in_order
+from laufruhe.extension import HOMES, extended, in_order, missing_extension
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
 from laufruhe.numerics.witness import collected
@@ -27,7 +27,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.prove.mounts.named import named_part
-from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     ProofData,
@@ -39,7 +38,6 @@ from laufruhe.solvers.conclusion import (
     with_constant_limits,
     without_proof,
 )
-from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
 from laufruhe.solvers.decomposition import is_separable, refuse_unused, solve_decomposed
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, Method, imported, is_pointwise
@@ -182,7 +180,7 @@ def solve(
     time_limit
         Time [s] after which searches end with their best design and its lower bound; None for no limit.
     diagnose
-        True to compute also the attainable values of limits in conflict, and the range of equally good designs.
+        True to complete the result by all diagnoses, such as the attainable values of limits in conflict.
 
     Raises
     ------
@@ -208,13 +206,8 @@ def solve(
         if reports:
             return without_proof(result, reports[0])
         result = check_by_walk(problem, result, time.thread_time() - spent)
-        if not diagnose or result.status is Status.FEASIBLE:
-            return result
-        if result.status is Status.OPTIMAL:
-            return replace(result, free=free_decisions(result))
-        result = with_attainable_limits(
-            result, problem, open_kinds(problem), time.perf_counter() - started, _solve_reduced
-        )
+        for diagnosis in DIAGNOSES.values() if diagnose else ():
+            result = diagnosis.complete(result, problem, time.perf_counter() - started, _solve_reduced)
         return without_proof(result, reports[0]) if reports else result
 
 
@@ -246,22 +239,22 @@ def method_of(problem: Problem) -> Method:
     return next(method for method in METHODS if method.suits(problem))
 
 
-def refuse(problem: Problem) -> None:
+def refuse(problem: Problem, ranks: Sequence[PriorityLevel] = ()) -> None:
     """Raise an error for a problem that no method solves; `solve` and `check` call it first.
+
+    The problem is complete, or has one objective of `ranks`.
 
     Raises
     ------
     ModelError
         If the objective depends on no open number, or a combination of open numbers has no method.
     """
-    _refuse(problem, ())
-
-
-def _refuse(problem: Problem, ranks: Sequence[PriorityLevel]) -> None:
-    # the problem has one objective of `ranks`, or is complete
     for reduction in reductions():
         if reduction.refuse is not None and reduction.applies(problem):
             return reduction.refuse(problem)
+    if problem.ranks:
+        name = "objectives in order"
+        raise ModelError(f"[[objective]] {'; '.join(missing_extension(HOMES['reductions'][name]))}")
     kinds = open_kinds(problem)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError(
@@ -332,19 +325,6 @@ def by_solver(problem: Problem, name: str) -> Problem:
     return problem.changed(origin=problem.origin, search=replace(problem.search, solver=name))
 
 
-def _refuse_ranks(problem: Problem) -> None:
-    for rank in problem.ranks:
-        _refuse(problem.changed(ranks=(), objective=rank.terms), problem.ranks)
-
-
-def _solve_ranks(problem: Problem, decide: Decide, _: Decide) -> Result:
-    from laufruhe.solvers.lexicographic import solve_lexicographic
-
-    is_divided = method_of(problem).solver is solve_separable
-    solve_rank = partial(solve_decomposed, solve=decide, ranks=problem.ranks) if is_divided else decide
-    return solve_lexicographic(problem, solve_rank)
-
-
 def _constant_limits(problem: Problem) -> list[Limit]:
     kinds = open_kinds(problem)
     return [limit for limit in problem.limits if not depends(limit.measure.channel, kinds, problem)]
@@ -405,11 +385,31 @@ class Reduction:
 
 REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("refined sampling", lambda _: True, lambda p, _, rest: refine_sampling(p, rest)),
-    Reduction("lexicographic objectives", lambda p: bool(p.ranks), _solve_ranks, _refuse_ranks),
     Reduction("constant limits", lambda p: bool(_constant_limits(p)), _without_constant_limits),
     Reduction("constant objective", _has_constant_objective, _solve_without_decisions),
 )  # fmt: skip
 """Reductions of the core, in the order in which they are tried."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Completion of a result at the end of a solve with `diagnose`.
+
+    Attributes
+    ----------
+    name
+        Name for messages.
+    complete
+        Function of a result, its problem, the duration of the solve [s] and a solver of further problems that returns
+        the completed result.
+    """
+
+    name: str
+    complete: Callable[[Result, Problem, float, Decide], Result]
+
+
+DIAGNOSES: Mapping[str, Diagnosis] = extended("diagnoses", Diagnosis, ())
+"""Diagnoses of extensions by their names."""
 
 
 @cache
@@ -444,7 +444,7 @@ def _relaxation(problem: Problem, kinds: frozenset[Kind], method: Method) -> Pro
 
 def _is_solvable(problem: Problem) -> bool:
     try:
-        _refuse(problem, ())
+        refuse(problem)
     except ModelError:
         return False
     return True

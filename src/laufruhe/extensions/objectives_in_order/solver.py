@@ -12,10 +12,10 @@ the lower bound of each rank under them holds for it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from laufruhe.extensions.objectives_in_order.equal_designs import equal_designs
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.problem.evaluation import objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit
@@ -24,18 +24,18 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import PROOF_RANK, Proof
 from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.conclusion import is_sampled
-from laufruhe.solvers.cones.equal_designs import equal_designs
+from laufruhe.solvers.decomposition import solve_decomposed
+from laufruhe.solvers.methods import Decide, Reduction, method_of, refuse, solve_separable
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import DecisionRange, ObjectiveValue, RankValue
 
-Solve = Callable[[Problem], Result]
 CLOSE, SAMPLED = 1e-9, 1e-5
 """Smallest relative slack of limits on earlier objectives: of exact measures, and of measures from samples."""
 WIDER = (0.0, 10.0 * SAMPLED)
 """Further relative slacks, tried in turn until the solver finds a design."""
 
 
-def solve_lexicographic(problem: Problem, solve: Solve) -> Result:
+def solve_lexicographic(problem: Problem, solve: Decide) -> Result:
     """Return the result of several objectives in order of priority.
 
     Each is minimised with limits on the objectives before it.
@@ -126,3 +126,17 @@ def _joint_result(
         timing={name: sum(stage.timing.get(name, 0.0) for stage in stages) for x in stages for name in x.timing},
         ranks=tuple(ranks),
     )
+
+
+def _solve(problem: Problem, decide: Decide, _: Decide) -> Result:
+    is_divided = method_of(problem).solver is solve_separable
+    solve_rank = partial(solve_decomposed, solve=decide, ranks=problem.ranks) if is_divided else decide
+    return solve_lexicographic(problem, solve_rank)
+
+
+def _refuse(problem: Problem) -> None:
+    for rank in problem.ranks:
+        refuse(problem.changed(ranks=(), objective=rank.terms), problem.ranks)
+
+
+ORDER = Reduction("objectives in order", lambda problem: bool(problem.ranks), _solve, _refuse, "constant limits")

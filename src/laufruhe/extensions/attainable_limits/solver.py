@@ -7,15 +7,14 @@ that cannot be an objective is bisected: each trial value of the limit is a prob
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 from laufruhe.errors import LaufruheError
 from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, until_time_limit
 from laufruhe.numerics.progress import report_progress, search_scope
-from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import depends
+from laufruhe.problem.dependence import depends, open_kinds
 from laufruhe.problem.evaluation import objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -33,10 +32,10 @@ from laufruhe.solvers.conclusion import (
     smallest_conflict,
     violated_limits,
 )
+from laufruhe.solvers.methods import Decide, Diagnosis
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import AttainableLimit, ObjectiveValue
 
-Solve = Callable[[Problem], Result]
 MIN_SECONDS = 10.0
 """Time limit for the attainable values of all limits together [s], if the solve itself took less time."""
 HALVINGS, CLOSE = 10, 1e-3
@@ -53,23 +52,23 @@ class _Answer:
     is_infeasible: bool = False
 
 
-def with_attainable_limits(
-    result: Result, problem: Problem, kinds: Collection[Kind], spent: float, solve: Solve
-) -> Result:
-    """Return a result without a design, with the attainable value of each limit in conflict and the nearest design.
+def with_attainable_limits(result: Result, problem: Problem, spent: float, solve: Decide) -> Result:
+    """Return a result without a design with the attainable value of each limit in conflict and the nearest design.
 
-    If the search finds a feasible design, the result becomes that design. If a bound excludes all designs, the result
-    becomes infeasible.
+    Other results stay as they are. If the search finds a feasible design, the result becomes that design. If a bound
+    excludes all designs, the result becomes infeasible.
 
     Parameters
     ----------
-    problem, kinds
-        Problem as the caller of `solve` gave it, and kinds of its open numbers.
+    problem
+        Problem as the caller of `solve` gave it.
     spent
         Duration of the solve [s].
     solve
         Solver for the problem with another objective or other limits.
     """
+    if result.status.has_design:
+        return result
     names = _violated_names(result, problem)
     limits = [limit for limit in problem.limits if limit.name in names]
     # the largest violation of the nearest design comes first
@@ -84,7 +83,7 @@ def with_attainable_limits(
         for k, limit in enumerate(limits):
             report_progress("attainable limits", k, len(limits))
             with search_scope(f"attainable value of '{limit.name}'"), limit_time(seconds_left() / (len(limits) - k)):
-                answer = _find_attainable(limit, problem, kinds, result, solve)
+                answer = _find_attainable(limit, problem, result, solve)
                 entry = answer.attainable
                 is_ended = is_time_over() and not entry.why and entry.proof is not Proof.GLOBAL
                 answers.append(replace(answer, attainable=replace(entry, ended=is_ended)))
@@ -120,7 +119,7 @@ def with_attainable_limits(
     return replace(result, nearest=min(known, key=lambda candidate: candidate.violation, default=None))
 
 
-def _solve_with_fine_sampling(solve: Solve, problem: Problem, part: Problem) -> Result:
+def _solve_with_fine_sampling(solve: Decide, problem: Problem, part: Problem) -> Result:
     # P7: means of few samples are inexact, so more samples settle a doubt about feasibility
     result = solve(part)
     if not result.status.has_design or result.objective is None:
@@ -141,7 +140,7 @@ def _violated_names(result: Result, problem: Problem) -> Collection[str]:
     return violated or [limit.name for limit in problem.limits]
 
 
-def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Result, solve: Solve) -> _Answer:
+def _find_attainable(limit: Limit, problem: Problem, result: Result, solve: Decide) -> _Answer:
     """Return the value that a limited measure can reach while all other limits hold.
 
     The upper side of the limit comes first. The lower side follows if no design meets it together with the others.
@@ -159,7 +158,7 @@ def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], re
         entry = replace(default, side=side, limit=limit_value)
         if is_time_over():
             return _Answer(replace(entry, why=LONG))
-        if not depends(measure.channel, kinds, problem):
+        if not depends(measure.channel, open_kinds(problem), problem):
             known = {entry.name: entry.value for entry in result.limits}
             value = math.nan if result.initial.resonance else known.get(limit.name, math.nan)
             return _Answer(replace(entry, value=value, why="no open number changes it"))
@@ -204,7 +203,7 @@ def _answer_without_design(entry: AttainableLimit, result: Result) -> _Answer:
 
 
 def _bisect(
-    entry: AttainableLimit, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
+    entry: AttainableLimit, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Decide
 ) -> _Answer:
     """Return the value that a limited measure can reach, by bisection of the limit.
 
@@ -257,3 +256,6 @@ def _feasible_result(result: Result, problem: Problem, candidate: Result) -> Res
         final=final,
         error=partial(objective_error, restored, final),
     )
+
+
+DIAGNOSIS = Diagnosis("attainable limits", with_attainable_limits)

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.extensions.attainable_limits.solver import CLOSE, LONG, _bisect, with_attainable_limits
 from laufruhe.files.reader import load_tables
 from laufruhe.numerics.budget import limit_time, minimum_time, seconds_left
 from laufruhe.numerics.progress import Step, progress_listener
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
@@ -28,7 +28,6 @@ from laufruhe.report.sections.values import attainable as attainable_tables
 from laufruhe.report.wording import attainable, explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.accuracy import objective_error
-from laufruhe.solvers.attainable_limits import CLOSE, LONG, _bisect, with_attainable_limits
 from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design, infeasible_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import AttainableLimit
@@ -93,7 +92,7 @@ def keeps(found: Evaluation, limits: tuple[Limit, ...]) -> bool:
 @pytest.fixture(autouse=True)
 def _enough_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Give all limits enough time on a slow machine, and where calls are traced."""
-    monkeypatch.setattr("laufruhe.solvers.attainable_limits.MIN_SECONDS", 600.0)
+    monkeypatch.setattr("laufruhe.extensions.attainable_limits.solver.MIN_SECONDS", 600.0)
 
 
 SCENES = {
@@ -244,7 +243,7 @@ def result_with_reach(problem: Problem, status: Status, seconds: float | None = 
     """Return the result with attainable limits, as if a method had ended with this status."""
     actual = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
     with limit_time(seconds):
-        return with_attainable_limits(actual, problem, {Kind.UNBALANCE}, 1.0, solve)
+        return with_attainable_limits(actual, problem, 1.0, solve)
 
 
 @pytest.mark.slow
@@ -302,7 +301,7 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     steps: list[Step] = []
     none = infeasible_result(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
     with limit_time(0.4), progress_listener(steps.append):
-        result = with_attainable_limits(none, problem, {Kind.UNBALANCE}, 1.0, slow)
+        result = with_attainable_limits(none, problem, 1.0, slow)
     assert [(each.ended, each.why) for each in result.reached] == [(True, "")] * 2
     assert all("at the time limit" in text for text in attainable(result)[:2])
     assert shares[:2] == pytest.approx([0.2, 0.2])

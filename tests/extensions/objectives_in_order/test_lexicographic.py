@@ -15,13 +15,13 @@ import pytest
 import moving_masses as mm
 from laufruhe.errors import InputError
 from laufruhe.extensions.fidelity.trade import trade
+from laufruhe.extensions.objectives_in_order.solver import solve_lexicographic
 from laufruhe.files.reader import load
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.sections import tables_of
 from laufruhe.solvers import solve
-from laufruhe.solvers.lexicographic import solve_lexicographic
 from laufruhe.solvers.result import Status
 from problem_files import changed, loaded
 from ready import solved

@@ -18,10 +18,12 @@ from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.numerical_zero import numerical_zero
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, FEASIBLE, evaluate_design, unbalance_values
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.tie_break import distance
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.methods import Decide, Diagnosis
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import DecisionRange
 
 MAX_OPEN = 16
@@ -173,3 +175,10 @@ def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
 def _size(domain: Domain, x: Array) -> float:
     part = x[domain.columns]
     return float(part[0]) if domain.width == 1 else float(np.hypot(*part))
+
+
+def _with_free_decisions(result: Result, _: Problem, __: float, ___: Decide) -> Result:
+    return replace(result, free=free_decisions(result)) if result.status is Status.OPTIMAL else result
+
+
+FREE_DECISIONS = Diagnosis("free decisions", _with_free_decisions)

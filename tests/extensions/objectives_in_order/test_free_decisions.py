@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.extensions.objectives_in_order.equal_designs import FREE, free_decisions, ranges_of
 from laufruhe.files.reader import load, load_tables
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -22,7 +23,6 @@ from laufruhe.report.sections.values import decisions
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design
-from laufruhe.solvers.cones.equal_designs import FREE, free_decisions, ranges_of
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import relevant_decisions
