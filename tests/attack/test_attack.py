@@ -87,7 +87,7 @@ def test_a_lie_is_found_out(lie: Any, message: str, example: tuple[Table, Result
 
 
 def test_a_design_that_is_not_the_best_is_found_out(example: tuple[Table, Result], tmp_path: Path) -> None:
-    """The optimum within a tighter limit, claimed for this one."""
+    """Check that the optimum within a tighter limit, claimed for the looser one, is reported."""
     table, result = example
     tighter = [{**limit, "max": f"{0.8 * number(limit['max'])} kg"} for limit in table["constraints"]]
     worse = solved({**table, "constraints": tighter}, tmp_path)

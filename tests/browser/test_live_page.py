@@ -54,7 +54,7 @@ def shown(every: Page):
 
 @pytest.mark.parametrize("width", [420, 500, 700, 1280])
 def test_paths_of_all_mounts_are_of_one_size(shown, width):
-    """The last row too, which may have fewer."""
+    """Check equal sizes of all paths, also in a last row with fewer."""
     usual = shown.viewport_size
     shown.set_viewport_size({"width": width, "height": 900})
     widths = shown.evaluate("[...document.querySelectorAll('.live-polar svg')].map(svg => svg.clientWidth)")

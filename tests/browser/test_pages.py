@@ -57,7 +57,7 @@ def test_reports_fit_on_paper(shown: Page) -> None:
 
 
 def test_paper_is_white_and_its_letters_dark(shown: Page) -> None:
-    """Also where the screen is dark."""
+    """Check the printed page on a dark screen too."""
     shown.emulate_media(media="print", color_scheme="dark")
     seen = shown.evaluate(COLOURS, "h1, h2, p, a, th, td, figcaption")
     assert seen
@@ -100,7 +100,7 @@ def test_the_documentation_has_no_serious_finding(name: str, page: Page) -> None
 
 
 def test_only_what_is_wider_than_the_screen_says_so(shown: Page) -> None:
-    """On a phone each picture and wide table says that it moves sideways."""
+    """Check that on a phone each wide picture and table, and nothing else, says that it scrolls."""
     shown.emulate_media(media="screen")
     shown.set_viewport_size({"width": 390, "height": 800})
     # a timeline of scrolling is measured with the next frame

@@ -17,7 +17,7 @@ TRUE_MEAN = 46.10256
 
 
 def test_a_mean_is_read_at_the_angles_of_its_bound() -> None:
-    """The bound of the whole cycle lies over the mean at 360 angles: the value is read at more, and is over it."""
+    """Check that a mean is read at more than 360 angles if its bound over the cycle is above it there."""
     result = laufruhe.solve(INPUTS / "places-case.toml")
     assert result.objective is not None
     assert result.certificate is not None

@@ -118,7 +118,7 @@ def test_a_proof_that_contradicts_a_design_is_withheld(monkeypatch: pytest.Monke
 
 @pytest.mark.slow
 def test_workers_report_what_they_met(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No report leaves a worker process by itself: it comes with the answer."""
+    """Check that reports of worker processes come with their answers."""
     monkeypatch.delenv(STRICT)
     with Processes(1) as executor, collected() as reports:
         assert [answer for _, answer in unordered_map(contradicted, [2.0], executor)] == [2.0]

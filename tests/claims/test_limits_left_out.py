@@ -50,7 +50,7 @@ def test_a_limit_with_room_takes_nothing_from_the_proof(problem: Problem) -> Non
 
 
 def test_the_optimum_without_a_limit_that_it_keeps_is_the_optimum() -> None:
-    """A weight under a limit on transmissibility, of which cone programs know nothing: against random designs."""
+    """Compare a weight under a limit on transmissibility, unknown to cone programs, with random designs."""
     problem = laufruhe.load({"title": "ratio", **transmissibility_and_weights(np.random.default_rng(1))})
     result, random = laufruhe.solve(problem), np.random.default_rng(2)
     assert result.certificate is not None
@@ -69,7 +69,7 @@ def test_the_optimum_without_a_limit_that_it_keeps_is_the_optimum() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("share", "kind"), [(1.01, Proof.GLOBAL), (0.99, Proof.WITHIN_GAP)])
 def test_stiffness_has_a_bound_under_a_limit_without_formulas(share: float, kind: Proof) -> None:
-    """Boxes of stiffness know no motion frequencies, which a limit holds just above or below those of the optimum."""
+    """Check the bound of stiffness under a limit on motion frequencies just above or below the optimum's."""
     own = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
     free, measure = laufruhe.solve(own), Measure(CHANNELS["motion frequencies"])
     limit = Limit("roll", measure, maximum=share * max(free.final.values(measure)))
@@ -85,7 +85,7 @@ def test_stiffness_has_a_bound_under_a_limit_without_formulas(share: float, kind
 @pytest.mark.slow
 @pytest.mark.skipif("worst mean" not in NORMS, reason="the extension worst_mean is removed")
 def test_boxes_bound_a_norm_that_no_method_of_mounts_accepts() -> None:
-    """Worst means of forces on open stiffness, which local programs decide, against random designs."""
+    """Compare worst means of forces on open stiffness with random designs."""
     problem = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
     worst = problem.changed(objective=(Term(Measure(CHANNELS["mount force"], NORMS["worst mean"])),), limits=())
     result, random = laufruhe.solve(worst), np.random.default_rng(3)

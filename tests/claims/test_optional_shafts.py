@@ -40,7 +40,7 @@ def with_shaft(scene: dict[str, Any]) -> dict[str, Any]:
     ids=["uneven", "with an order", "two-stroke", "vee"],
 )
 def test_a_shaft_that_may_be_built_is_worth_what_it_is_worth_built(engine: dict[str, Any]) -> None:
-    """Nothing limits the firing intervals, so throws as given fire as they do without the choice."""
+    """Compare an optional shaft with the same shaft built, with free firing intervals."""
     scene = table(**engine)
     free, built = laufruhe.solve(scene), laufruhe.solve(with_shaft(scene))
     assert free.status == "optimal"
@@ -62,7 +62,7 @@ def test_intervals_that_are_given_still_hold() -> None:
 
 @pytest.mark.slow
 def test_angles_beside_given_throws_are_decided_locally() -> None:
-    """Throws that are open too leave nothing under 33.263 N, and a design of 33.279 N."""
+    """Check a local optimum of 33.279 N; with open throws the bound is 33.263 N."""
     result = laufruhe.solve((INPUTS / "vee-bank-and-split-open.toml").read_text())
     assert (result.status, result.certificate.kind, result.certificate.lower_bound) == ("feasible", "local", 0.0)
     assert 33.2627 < result.objective.value < 33.5

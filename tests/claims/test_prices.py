@@ -30,7 +30,7 @@ def prices(result: Any) -> dict[str, Price]:
 
 @pytest.mark.slow
 def test_a_size_at_the_end_of_its_angles() -> None:
-    """Between 41,926 N per kg m as it grows and 41,958 as it falls; the angle's bound is worth 681 N/rad."""
+    """Check prices of 41,926 N per kg m up and 41,958 down, and 681 N/rad for the angle."""
     text = (INPUTS / "size-at-the-end-of-its-angles.toml").read_text()
     result = laufruhe.solve(text)
     price_of, here = prices(result), result.objective.value
@@ -45,7 +45,7 @@ def test_a_size_at_the_end_of_its_angles() -> None:
 
 @pytest.mark.slow
 def test_a_limit_that_no_weight_moves() -> None:
-    """Weights make order 1, the limit is on order 2: relaxed it changes nothing, and tightened no design keeps it."""
+    """Check that a limit on order 2, which weights do not change, is free to relax and impossible to tighten."""
     text = (INPUTS / "limit-that-no-weight-moves.toml").read_text()
     result = laufruhe.solve(text)
     assert result.limits[0].active
@@ -60,7 +60,7 @@ def test_a_limit_that_no_weight_moves() -> None:
 
 @pytest.mark.slow
 def test_a_bound_at_a_kink_has_two_prices() -> None:
-    """A weight at nothing: on the other side it would weigh as much again, so only one way costs."""
+    """Check a weight of zero, which costs on one side only."""
     text = (INPUTS / "bound-at-a-kink.toml").read_text()
     result = laufruhe.solve(text)
     (bound,) = (one for one in result.decisions if one.name == "s0.u0.unbalance")
@@ -74,7 +74,7 @@ def test_a_bound_at_a_kink_has_two_prices() -> None:
 
 @pytest.mark.slow
 def test_an_envelope_has_a_price_with_places_open() -> None:
-    """-2605 N/m by differences of problems solved again."""
+    """Compare the price with -2605 N/m from differences of two solves."""
     result = laufruhe.solve(INPUTS / "envelope.toml")
     (price,) = (one.price for one in result.limits if one.name == "envelope radius")
     assert price.relaxed == pytest.approx(2605.0, rel=0.01)
@@ -83,7 +83,7 @@ def test_an_envelope_has_a_price_with_places_open() -> None:
 
 @pytest.mark.parametrize("count", [100, 3000])
 def test_rows_on_a_circle(count: int) -> None:
-    """Many rows of one length are told by some of them: the multiplier that balances a slope is its length."""
+    """Check that some of many rows of one length give the multiplier, the length of the slope."""
     turns = math.tau * np.arange(count) / count
     circle = Slopes(2.0 * np.stack([np.cos(turns), np.sin(turns)], axis=1), np.zeros((0, 2)))
     multipliers = prices_of([Slopes.smooth(np.array([-3.0, 4.0]))], [circle], np.zeros((0, 2)))
@@ -139,7 +139,7 @@ def test_prices_are_the_slopes_of_problems_solved_again(seed: int) -> None:
      (10, "peak to peak mount force"), (5, "peak to peak shaking force"), (2, "peak to peak roll moment")],
 )  # fmt: skip
 def test_prices_of_norms_that_group_rows(seed: int, quantity: str) -> None:
-    """Points share a worst mean, and points of the cycle the largest swing."""
+    """Check worst means over points, and peak to peak over the cycle."""
     table = random_problem(np.random.default_rng(seed)) | {"objective": {"minimise": quantity}}
     table["operating_points"] = [{"name": "fast", "speed": "2500 rpm"}, {"name": "slow", "speed": "2400 rpm"}]
     _moved_both_ways(table)
@@ -147,7 +147,7 @@ def test_prices_of_norms_that_group_rows(seed: int, quantity: str) -> None:
 
 @pytest.mark.slow
 def test_a_star_alone_has_no_prices() -> None:
-    """Nothing takes a step: a star keeps a limit, or another one has to."""
+    """Check that an open star, which takes no small step, has no prices."""
     engine = {
         "layout": "inline", "cycle": "four-stroke", "stroke": "90 mm", "rod_ratio": 0.28, "cylinders": 5,
         "reciprocating_mass": "0.6 kg", "rotating_mass": "0.4 kg", "cylinder_spacing": "95 mm", "throws": "open",
@@ -212,7 +212,7 @@ def _agrees(price: Price, here: float, moved: list[dict[str, Any]], step: float,
 
 
 def test_multipliers_of_edges_that_hang_together() -> None:
-    """|x| + |y| least, x + y at least 1, x no more than 1: at (1, 0) either holds it, and they share a price."""
+    """Check that two edges share a price: |x| + |y| least, x + y at least 1, x at most 1, at (1, 0)."""
     objective = [Slopes(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]))]
     result = prices_of(objective, [Slopes.smooth(np.array([-1.0, -1.0]))], np.array([[1.0, 0.0]]))
     assert result is not None
@@ -227,7 +227,7 @@ def test_multipliers_of_edges_that_hang_together() -> None:
 
 
 def test_two_limits_that_say_the_same_share_their_price() -> None:
-    """x at most 1, twice, and 2 x wanted: to relax one of them gains nothing, to tighten one costs all."""
+    """Check x at most 1, twice, for 2 x: relaxing one gains nothing, tightening one costs all."""
     limit = Slopes.smooth(np.array([1.0, 0.0]))
     result = prices_of([Slopes.smooth(np.array([-2.0, 0.0]))], [limit, limit], np.zeros((0, 2)))
     assert result is not None
@@ -236,7 +236,7 @@ def test_two_limits_that_say_the_same_share_their_price() -> None:
 
 
 def test_a_limit_at_its_kink_beside_a_bound() -> None:
-    """x + y wanted, max(x, y) and x at most 1: relaxed by e the limit gains e of y, tightened it costs both."""
+    """Check x + y with max(x, y) and x at most 1: relaxing the limit by e gains e, tightening costs 2 e."""
     kinked = Slopes(np.array([[1.0, 0.0], [0.0, 1.0]]), np.zeros((0, 2)))
     result = prices_of([Slopes.smooth(np.array([-1.0, -1.0]))], [kinked], np.array([[1.0, 0.0]]))
     assert result is not None

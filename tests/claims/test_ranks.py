@@ -18,7 +18,7 @@ INPUTS = Path(__file__).parent / "inputs"
 
 @pytest.mark.slow
 def test_a_sacrifice_that_is_allowed_is_no_gap() -> None:
-    """The first may rise by a tenth for the second: it does, by 0.67 %."""
+    """Check that a first objective that rises by 0.67 % of an allowed tenth has no gap."""
     result = laufruhe.solve(INPUTS / "ranks-with-a-sacrifice.toml")
     first, second = result.ranks
     assert first.final > 1.005 * first.minimum
@@ -29,7 +29,7 @@ def test_a_sacrifice_that_is_allowed_is_no_gap() -> None:
 
 @pytest.mark.slow
 def test_a_first_objective_that_cancels_is_zero() -> None:
-    """A shaft against the piston's roll of order 1: nothing is left, and the second is least under that."""
+    """Check that a shaft cancels the roll of order 1, and that the second objective is least under that."""
     result = laufruhe.solve(INPUTS / "ranks-with-a-zero.toml")
     first, second = result.ranks
     assert first.initial == pytest.approx(5.827, abs=1e-3)
@@ -42,7 +42,7 @@ def test_a_first_objective_that_cancels_is_zero() -> None:
 
 @pytest.mark.parametrize("seed", first_fast(range(4), 0, 2))
 def test_a_cancelled_order_is_proven_at_any_rank(seed: int) -> None:
-    """A crank's first order against two shafts, as the first of two objectives or alone."""
+    """Check order 1 of a crank against two shafts, as the first of two objectives and alone."""
     rng = np.random.default_rng(seed)
     table = tomllib.loads((INPUTS / "ranks-with-a-zero.toml").read_text())
     table["engine"]["stroke"] = f"{rng.uniform(50.0, 120.0)} mm"
@@ -57,7 +57,7 @@ def test_a_cancelled_order_is_proven_at_any_rank(seed: int) -> None:
 
 @pytest.mark.slow
 def test_tables_of_objectives_that_needed_other_numbers_of_angles() -> None:
-    """A mean of a bearing's force at many, a root mean square at few."""
+    """Check tables of a bearing's mean force at many angles and a root mean square at few."""
     result = laufruhe.solve(INPUTS / "ranks-of-a-bearing.toml")
     assert result.initial.samples == result.final.samples
     assert result.objective.value == pytest.approx(796.32, abs=0.01)

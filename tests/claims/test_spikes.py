@@ -54,7 +54,7 @@ def of_design(result: Any, pressure: np.ndarray, norm: str) -> float:
 
 @pytest.mark.slow
 def test_a_bound_allows_for_what_nobody_measured_between_two_points() -> None:
-    """A design has 39.0541 N m where the trace goes straight; nothing less than 39.2356 was once called proven."""
+    """Check the bound below a design of 39.0541 N m on a straight trace; 39.2356 would be false."""
     result = laufruhe.solve(INPUTS / "spike.toml")
     pressure = np.ones(1440)
     pressure[30] = 200.0
@@ -68,7 +68,7 @@ def test_a_bound_allows_for_what_nobody_measured_between_two_points() -> None:
 
 @pytest.mark.parametrize(("seed", "norm"), first_fast([(1, "mean"), (2, "rms"), (3, "maximum"), (4, "mean")], 0, 3))
 def test_no_bound_lies_over_a_design(seed: int, norm: str, tmp_path: Path) -> None:
-    """Spikes of any height and place, one or a few: designs found with many steps of the gas are above every bound."""
+    """Compare bounds with designs at many gas steps, for spikes of any height, place and number."""
     rng = np.random.default_rng(seed)
     pressure = np.ones(int(rng.choice([360, 720, 1440])))
     pressure[rng.integers(0, len(pressure), size=int(rng.integers(1, 4)))] = rng.uniform(20.0, 300.0)

@@ -105,7 +105,7 @@ def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["study-soft-mounts", "worked-diesel", "locomotive-two-cylinder"])
 def test_a_design_that_is_said_not_to_exist_is_found(name: str) -> None:
-    """The design as given breaks a limit, or has room that a step away from it keeps."""
+    """Check that a walk finds the design, from an initial one that breaks a limit or near a limit."""
     result = solved(name)
     lie = replace(
         result, status=Status.INFEASIBLE, objective=None, certificate=None, decisions=(), final=result.initial,
@@ -137,7 +137,7 @@ def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
 
 
 def test_throws_are_walked_from_the_best_star_only() -> None:
-    """Move every throw and angle of the best star, and exchange its cranks; without a star move nothing."""
+    """Check that every throw and angle of the best star moves and its cranks swap; without a star none."""
     problem = load(PROBLEMS / "inline-seven-uneven.toml")
     assert problem.phasing is not None
     phasing, throws = problem.phasing, tuple(math.tau * k / 7 for k in range(7))
@@ -221,7 +221,7 @@ def claims_no_more_than(result: Result, value: float) -> bool:
 @pytest.mark.slow
 @pytest.mark.usefixtures("transmitted")
 def test_a_channel_declared_constant_by_mistake_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A channel that is said not to be on the mounts, while their stiffness is open."""
+    """Check a channel declared to be off the mounts while their stiffness is open."""
     names = ("mount force", "mount travel")
     monkeypatch.setattr(Measure, "on_mounts", property(lambda self: self.is_load and self.load.name in names))
     problem = load(RESULTANT)

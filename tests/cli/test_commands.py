@@ -318,7 +318,7 @@ def test_help_imports_no_heavy_library() -> None:
 
 @pytest.mark.parametrize(("given", "threads"), [({}, ["1"] * 3), ({"OPENBLAS_NUM_THREADS": "2"}, ["2"])])
 def test_linear_algebra_of_a_command_takes_one_thread_by_default(given: dict[str, str], threads: list[str]) -> None:
-    """Said before NumPy reads it, by the command alone: who imports the package keeps what the environment says."""
+    """Check that a command sets one thread before NumPy starts, and an import keeps the environment."""
     code = (
         "import os, sys\n"
         "from laufruhe.cli import commands\n"

@@ -25,7 +25,7 @@ def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPa
 
 
 def test_by_whom_a_picture_is_drawn_cannot_be_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw a crank that was open here, and in two processes."""
+    """Compare pictures of an open crank drawn in this process and in two processes."""
     result = solved("two-stroke-four-open")
     here, there = (drawn(result, tmp_path / str(count), count, monkeypatch) for count in (0, 2))
     assert list(here) == list(there)

@@ -44,7 +44,7 @@ def started(folder: Path, code: str) -> subprocess.Popen[str]:
     [(DEAF, signal.SIGTERM, "interrupted\n"), (ASLEEP, signal.SIGINT, "interrupted, nothing was written\n")],
 )
 def test_a_signal_ends_a_process_or_kills_it(code: str, number: signal.Signals, message: str, tmp_path: Path) -> None:
-    """Long before either would end: the one counts for days, the other sleeps for hours."""
+    """Check that a signal ends a process that counts for days, and one that sleeps for hours."""
     running = started(tmp_path, code)
     running.send_signal(number)
     out, err = running.communicate(timeout=LONG)

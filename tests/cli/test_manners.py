@@ -88,7 +88,7 @@ def test_closed_streams(words: str, status: int, said: str, here: Path) -> None:
 
 @pytest.mark.slow
 def test_files_do_not_take_the_numbers_of_closed_streams(here: Path) -> None:
-    """Keep progress out of the answer: a pipe gets neither a spinner nor colours."""
+    """Compare files written with open and with closed streams; a pipe gets no colours."""
     shutil.copy(SINGLE, here / "p.toml")
     for out, streams in (("open", ""), ("closed", "-q >&- 2>&- <&-")):
         process = shell(f"evaluate p.toml --no-plots --out {out} {streams}", here)
@@ -293,7 +293,7 @@ def test_pictures_have_the_chosen_format(here: Path, kind: str, ends: set[str]) 
 @pytest.mark.slow
 @pytest.mark.parametrize(("more", "lines"), [([], 1), (["-q"], 0)])
 def test_letters_without_a_font_give_one_warning(more: list[str], lines: int, tmp_path: Path) -> None:
-    """Draw once in a process without a backend and with broken settings; hardly any font has Linear A."""
+    """Check letters of Linear A in a new process without a backend and with broken settings."""
     (tmp_path / "matplotlibrc").write_bytes(b"font.size: nonsense\n\xff\xfe\n")
     path = written(tmp_path, scenes.SHAKING_ONLY.replace('title = "', 'title = "\U00010600 '))
     words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", str(tmp_path / "out"), *more]

@@ -44,7 +44,7 @@ def test_pages_made_of_other_files_are_up_to_date(place: str) -> None:
 
 
 def test_pages_say_all_without_the_site() -> None:
-    """Only what is told beside it is filled in as the site is built."""
+    """Check that the build of the site fills in only details."""
     filled = {
         "changes.md": "CHANGELOG.md",
         "contributing.md": "CONTRIBUTING.md",
@@ -63,7 +63,7 @@ LONGEST = 1500
 
 
 def test_pages_are_read_in_one_sitting() -> None:
-    """A page that outgrows its subject is divided; pages of theory follow their derivations."""
+    """Check the length of pages; pages of theory follow their derivations."""
     paths = [path for folder in ("how-to", "tutorials", "reference") for path in (DOCS / folder).glob("*.md")]
     lengths = {str(path.relative_to(DOCS)): len(path.read_text(encoding="utf-8").split()) for path in paths}
     assert not {page for page, words in lengths.items() if words > LONGEST} - PLAIN_TABLES
@@ -71,7 +71,7 @@ def test_pages_are_read_in_one_sitting() -> None:
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_pictures_of_the_gallery_are_of_ready_problems(path: Path) -> None:
-    """They are named, so a program runs from the folder that it is downloaded to."""
+    """Check that pictures name ready problems, so that a program runs from its folder."""
     calls = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.Call)]
     solved = [ast.literal_eval(call.args[0]) for call in calls if ast.unparse(call.func) == "laufruhe.solve"]
     assert solved

@@ -92,7 +92,7 @@ def test_deep_nesting(deep: int, open_close: str, tmp_path: Path) -> None:
      "x = 1\na = " + "{a = " * 17, "a.'b'.c = { " + "d." * 17 + "e = 1 }"],
 )  # fmt: skip
 def test_deep_texts_are_not_parsed(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A parser takes memory with the square of a key's parts: 40 kB took 1.6 GB."""
+    """Check a text whose parser would take 1.6 GB for 40 kB."""
     monkeypatch.setattr(tomllib, "loads", None)
     refused(written(tmp_path, text), f"line {1 + text.count(chr(10))}", "nested more than 16 levels deep")
 
@@ -179,7 +179,7 @@ def test_a_trace_that_never_ends(tmp_path: Path) -> None:
 
 
 def test_a_trace_larger_than_any(tmp_path: Path) -> None:
-    """1 GB took 2.1 GB of memory."""
+    """Check a trace of 1 GB, which once took 2.1 GB of memory."""
     path = written(tmp_path, harness.TRACED)
     with (tmp_path / "trace.csv").open("wb") as stream:
         stream.truncate(30_000_001)

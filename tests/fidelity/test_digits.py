@@ -17,7 +17,7 @@ from rigid_digits import rigid_part
 
 @pytest.mark.parametrize("seed", range(24))
 def test_double_precision_on_random_engines(seed: int) -> None:
-    """Offsets, rods with inertia, rotating masses, vees, shafts either way, gas, one or two points, every norm."""
+    """Check offsets, rod inertia, rotating masses, vees, shafts, gas, one or two points, and every norm."""
     result = rigid_part(random_problem(random.Random(40 + seed)))
     assert result.covered
     assert result.error <= 2e-14

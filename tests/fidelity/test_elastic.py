@@ -36,7 +36,7 @@ def held(path: Path) -> Problem:
 
 @pytest.mark.parametrize("path", ELASTIC, ids=lambda path: path.stem)
 def test_modes_that_nothing_excites_answer_nothing(path: Path) -> None:
-    """Motion by the whole matrices in the coordinates of the block, nothing left out."""
+    """Compare motion with the whole matrices in the coordinates of the block."""
     problem = held(path)
     engine, point = problem.engine, problem.points[0]
     assert engine.block is not None

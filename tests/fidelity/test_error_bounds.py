@@ -31,7 +31,7 @@ def _sampling_errors(seed: int) -> tuple[float, float]:
 
 @pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 1, 2))
 def test_estimate_is_not_below_the_error(first: int, count: int) -> None:
-    """It is no idle bound either: half of the estimates are below ten times the error."""
+    """Check that half of the estimates are below ten times the error, and none below it."""
     pairs = {seed: _sampling_errors(100_000 + seed) for seed in range(first, first + count)}
     assert [seed for seed, (true, stated) in pairs.items() if true > stated] == []
     assert np.median([stated / true for true, stated in pairs.values() if true > ROUNDING]) < 10.0

@@ -178,7 +178,7 @@ def test_error_with_gas_is_not_below_the_true_one(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", first_fast(range(40), 8, 8))
 def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
-    """On either side of a dead centre it is another: a peak stands there, and orders alone overshoot it."""
+    """Compare the peak pin force with both sides of every pressure jump, which orders alone overshoot."""
     rng = random.Random(seed)
     result = problem_of_peak(seed)
     point = replace(result.points[0], gas=_gas(rng))
@@ -210,7 +210,7 @@ def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
 
 
 def test_a_limited_peak_keeps_its_limit_at_the_bend(tmp_path: Path) -> None:
-    """The mean would have it at 2208 N; the peak stands at the cut-off, between two steps."""
+    """Check that a limit on the peak holds at the cut-off, which lies between two steps."""
     path, maximum = tmp_path / "limit.toml", 2100.0
     text = (
         BEND.replace("SAMPLES", "360").replace("[0, 0.4]", "[0, 1]").replace("maximum mount force", "mean mount force")

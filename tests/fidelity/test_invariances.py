@@ -55,7 +55,7 @@ def test_order_of_the_cylinders(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_front_and_back(seed: int) -> None:
-    """Mirrored in the plane x = 0 the crank turns as before."""
+    """Check that an engine mirrored in the plane x = 0 turns as before."""
     problem = random_problem(random.Random(seed), gas=True)
     engine = problem.engine
     _same(
@@ -71,7 +71,7 @@ def test_front_and_back(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_direction_of_time(seed: int) -> None:
-    """Backwards and mirrored in the plane y = 0 the crank turns as before; gas does not go backwards."""
+    """Check that an engine reversed in time and mirrored in y = 0 turns as before, without gas."""
     problem = random_problem(random.Random(seed), gas=False)
     engine = problem.engine
     rotors = [

@@ -186,7 +186,7 @@ def test_no_bound_where_a_limit_lacks_loads_in_other_designs(tmp_path: Path) -> 
 
 
 def test_bound_is_stated(tmp_path: Path) -> None:
-    """In the result, its file and its report; of all physics it is the gap of the proof."""
+    """Check the bound in result, file and report; with all physics it is the gap of the proof."""
     text = scenes.TIGHT + '\n[fidelity]\nkinematics = "two-order"\n'
     result, exact = (laufruhe.solve(laufruhe.load(written(tmp_path, each))) for each in (text, scenes.TIGHT))
     assert result.regret_bound is not None

@@ -49,7 +49,7 @@ def test_change_falls_with_the_flywheel() -> None:
 
 
 def test_motion_solves_the_differential_equation() -> None:
-    """J w' + J' w^2 / 2 = torque less load, integrated from the state that was found, comes back to it."""
+    """Compare J w' + J' w^2 / 2 = torque less load, integrated from the found state, with that state."""
     engine, fidelity = _engine((0,)), Fidelity(samples=1440, crank_inertia=0.15)
     part = engine.slider_cranks[0]
     motion = crank_motion(engine, POINT, fidelity)

@@ -192,7 +192,7 @@ def test_a_problem_goes_to_another_process(problem: Problem) -> None:
     ([None], ["s"]), (["a"], ["s.a"]), ([None, None], ["s.1", "s.2"]), (["a", None, "b"], ["s.a", "s.2", "s.b"]),
 ])  # fmt: skip
 def test_unbalances_of_a_shaft_have_the_same_name_everywhere(names: list[str | None], rotor_names: list[str]) -> None:
-    """In results and in edits."""
+    """Compare names in results and in edits."""
     tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
     weights = [{"x": f"{10 * k} mm", "unbalance": "0.01 kg m"} for k in range(len(names))]
     for weight, name in zip(weights, names, strict=True):

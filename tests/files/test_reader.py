@@ -288,7 +288,7 @@ BAD = [
 
 
 def test_all_missing_keys_are_named_at_once() -> None:
-    """Whatever finds them: the model of the file, the engine, its layout, an operating point."""
+    """Check keys missing in the model of the file, the engine, its layout and an operating point."""
     with pytest.raises(InputError) as caught:
         load('title = "x"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n[gas]\nmodel = "wiebe"\nimep = "1 bar"\n'
              "start = 0\n[[operating_points]]\nweight = 1\n")  # fmt: skip
@@ -307,7 +307,7 @@ def test_a_ring_has_the_inertia_of_its_mean_radius(tmp_path: Path) -> None:
 
 
 def test_pressures_of_an_operating_point(tmp_path: Path) -> None:
-    """They take the place of those of the gas; single cylinders keep their ratio to the common ones."""
+    """Check that they replace those of the gas, and that single cylinders keep their ratio."""
     point = (
         '[[operating_points]]\nname = "idle"\nspeed = "800 rpm"\nimep = "1.1 kp/cm^2"\npeak_pressure = "20 kp/cm^2"\n'
     )
@@ -384,7 +384,7 @@ class TestFiles:
         assert complaint_about(path) == "file: is no UTF-8 text (byte 10); save it as UTF-8"
 
     def test_several_mistakes_get_a_line_each(self, tmp_path: Path) -> None:
-        """In the order of the file, so that all can be mended at once."""
+        """Check the lines of all mistakes in the order of the file."""
         text = changed(changed(WHOLE, '"100 mm"', "100"), '"80 kp/cm^2"', '"80 kg"')
         with pytest.raises(InputError) as caught:
             load(written(tmp_path, text))
@@ -533,7 +533,7 @@ class TestTrace:
 
 
 def test_a_place_that_is_another_name_counts_from_one() -> None:
-    """A point without a name beside one whose name is the number of that point."""
+    """Check a point without a name beside one named by the number of that point."""
     tables = dict(tables_of(PROBLEMS / "tractor-single.toml"))
     points = [{"name": "2", "speed": "1500 rpm"}, {"speed": "2000 rpm", "imep": {"between": ["5 bar", "8 bar"]}}]
     problem = load_tables({**tables, "operating_points": points}, Path("points.toml"))

@@ -105,13 +105,13 @@ class TestCrankPinLoad:
         assert self.piston_force() == pytest.approx(2914, abs=self.mass_force_tolerance + 0.5)
 
     def test_rod_force(self) -> None:
-        """S = F / cos beta = 2941 N, cos beta = 0.9908."""
+        """Check S = F / cos beta = 2941 N, cos beta = 0.9908."""
         cosine = float(slider_crank.cos_psi(np, self.alpha, self.ratio, 0.0))
         assert cosine == pytest.approx(0.9908, abs=0.00005)
         assert self.rod_force() == pytest.approx(2941, abs=(self.mass_force_tolerance + 0.5) / cosine + 0.5)
 
     def test_centrifugal_force_of_the_rod(self) -> None:
-        """F_pl1 = 5346 N."""
+        """Check F_pl1 = 5346 N."""
         assert self.rod_centrifugal_force() == pytest.approx(5346, abs=0.5)
 
     def test_resultant(self) -> None:
@@ -131,7 +131,7 @@ class TestCrankPinLoad:
         assert abs(abs(f - s) - 3517) > 10 * (by_angle + by_rod_force + 0.5)
 
     def test_crank_pin_force(self) -> None:
-        """The same R = 3517 N from the loads of the pin, order by order, the gas held at 20 bar over the crankcase."""
+        """Compare R = 3517 N with the pin loads order by order, the gas held at 20 bar over the crankcase."""
         steps = tuple(np.arange(0.0, 4.0 * math.pi, 0.1 * math.pi).tolist())
         gas = PressureTrace(steps, (AMBIENT_PRESSURE + 20e5,) * len(steps))
         part = SliderCrank(
@@ -173,7 +173,7 @@ class TestFiveCylinders:
         return Engine("five", Cycle.FOUR_STROKE, cylinders)
 
     def test_forces_of_one_cylinder(self) -> None:
-        """F_r = 13 900, F_I = 9900, F_II = 2475 N."""
+        """Check F_r = 13 900, F_I = 9900, F_II = 2475 N."""
         one = Engine("one", Cycle.FOUR_STROKE, self.engine.slider_cranks[:1])
         turning = rotating_loads(one, self.speed).at(1)
         moving = reciprocating_loads(one, self.speed, TWO_ORDER)
@@ -214,7 +214,7 @@ class TestFiveCylinders:
         assert (couple[5] / couple[4]).real == pytest.approx(0.0, abs=1e-14)
 
     def test_first_order_couple(self) -> None:
-        """M_I max = 1330 Nm, drawn."""
+        """Check M_I max = 1330 Nm, drawn."""
         couple = reciprocating_loads(self.engine, self.speed, TWO_ORDER).at(1)
         assert abs(couple[4]) == pytest.approx(1330, abs=self.drawn)
         assert couple[5] == 0.0

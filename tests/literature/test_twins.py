@@ -58,7 +58,7 @@ def _masses(result: Result, phi: NDArray[np.float64]) -> list[tuple[float, float
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TWINS)
 def test_designs_against_masses_that_are_moved_step_by_step(name: str) -> None:
-    """Newton's law by differences: force, couple, and the roll moment from momentum and energy (C7)."""
+    """Compare force, couple and roll moment with Newton's law by differences and energy (C7)."""
     result = _solved(name)
     point, step, phi = result.problem.points[0], 2e-3, np.linspace(0.0, 2.0 * math.tau, 49)
     around = [_masses(result, phi + k * step) for k in (-2, -1, 0, 1, 2)]
@@ -95,7 +95,7 @@ def test_every_twin_is_proven(name: str) -> None:
     [("parallel-360", (360, 360)), ("parallel-180", (180, 540)), ("parallel-270", (270, 450)), ("boxer", (360, 360))],
 )
 def test_firings(name: str, intervals: tuple[float, float]) -> None:
-    """Chapter 4: in step, even; at 180 degrees, uneven in four strokes."""
+    """Check chapter 4: in step, even; at 180 degrees, uneven in four strokes."""
     assert np.degrees(_solved(name).final.engine.firing_intervals) == pytest.approx(intervals)
 
 

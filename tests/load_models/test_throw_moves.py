@@ -22,7 +22,7 @@ TABLE = {
 
 
 def test_a_bank_and_a_split_pin_move_by_what_they_are_moved() -> None:
-    """Up where the number is up, within the bounds at both ends; half of each goes with the first throw."""
+    """Check that both move up with their number, within bounds, half of each with the first throw."""
     phasing = load_tables(TABLE, Path("vee.toml")).phasing
     assert phasing is not None
     bank, split = math.radians(70.0), math.radians(5.0)

@@ -117,7 +117,7 @@ class TestFiringIntervals:
     def test_from_each_firing_to_the_next(
         self, fires: tuple[int, ...], cycle: Cycle, intervals: tuple[int, ...]
     ) -> None:
-        """In the order of firing from cylinder 1, back to it: they add up to the cycle."""
+        """Check the intervals in firing order from cylinder 1 around to it; they add up to the cycle."""
         parts = tuple(
             replace(PART, name=f"{k}", x=float(k), throw=math.radians(-f), firing_angle=math.radians(f))
             for k, f in enumerate(fires)

@@ -184,12 +184,12 @@ class TestFiring:
     def test_known_engines(
         self, cycle: Cycle, layout: Layout, throws: tuple[int, ...], order: list[int], fires: list[int]
     ) -> None:
-        """Crank angles of every cylinder's firing, counted from that of cylinder 1."""
+        """Compare firing angles of every cylinder, counted from cylinder 1."""
         result = firing_angles(cycle, layout, tuple(map(math.radians, throws)), order)
         assert np.degrees(result) == pytest.approx(fires, abs=1e-9)
 
     def test_intervals_that_are_given_are_those_of_the_dead_centres(self) -> None:
-        """Three throws that fire at 0, 200 and 450 deg, whichever number is last; another interval is refused."""
+        """Check three throws that fire at 0, 200 and 450 deg in any order; another interval is refused."""
         for order in ([1, 2, 3], [1, 3, 2]):
             fires = dict(zip(order, (0.0, 200.0, 450.0), strict=True))
             throws = tuple(math.radians(-fires[k]) for k in (1, 2, 3))
@@ -226,7 +226,7 @@ class TestFiring:
 
     @given(st.integers(1, 10), st.sampled_from(Cycle), st.randoms(use_true_random=False))
     def test_even_throws_fire_evenly(self, count: int, cycle: Cycle, random: object) -> None:
-        """Any order of any in-line engine, cylinder 1 at phi = 0, the others in their order a step apart."""
+        """Check any order of any in-line engine, cylinder 1 at phi = 0, the others a step apart."""
         order = list(range(2, count + 1))
         random.shuffle(order)  # type: ignore[attr-defined]
         order = [1, *order]

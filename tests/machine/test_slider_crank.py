@@ -124,6 +124,6 @@ class TestRefusals:
         assert SliderCrank("c", 0.0, 0.06, 0.2, 1.0, bore=0.1).piston_area == pytest.approx(math.pi * 0.0025)
 
     def test_almost_locked_cranks_turn(self) -> None:
-        """Up to the last bit below one."""
+        """Check ratios up to the last float below one."""
         part = SliderCrank("c", 0.0, 0.06, 0.06 / math.nextafter(1.0, 0.0), 1.0)
         assert part.rod_ratio < 1.0

@@ -185,7 +185,7 @@ def test_the_least_shortfall_is_that_of_a_grid(decoupled):
 
 @pytest.mark.parametrize("size", [1.0, 0.1, 1e-2, 1e-4, 1e-8])
 def test_no_shares_of_a_box_are_over_what_it_has_at_most(tmp_path, size):
-    """Nor is their shortfall under its least, where modes nearly cross too."""
+    """Check shares and their shortfalls against the bounds of a box, also where modes nearly cross."""
     problem = problem_of(tmp_path, ENGINE, TILTED, MOUNTS, SHORT + "wanted = 0.9")
     measure, generator = problem.objective[0].measure, np.random.default_rng(5)
     model = BoxModel(problem, evaluate_start(problem))

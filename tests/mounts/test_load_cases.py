@@ -141,7 +141,7 @@ GAPS = {"none": MOUNTS, "wide": with_stops("6 mm"), "narrow": with_stops("1.5 mm
 @pytest.mark.parametrize("gap", GAPS)
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Path) -> None:
-    """Bump stops that are met all over a box, nowhere, and in a part of it (E60)."""
+    """Check bump stops met in all of a box, in none of it, and in a part (E60)."""
     problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, OBJECTIVES[name])
     measure, evaluation = problem.objective[0].measure, evaluate(problem)
     model, generator, ratios = BoxModel(problem, evaluation), np.random.default_rng(1), []
@@ -163,7 +163,7 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
 @pytest.mark.parametrize("name", ["powertrain-joined-springs", "powertrain-hydraulic"])
 @pytest.mark.parametrize("quantity", ["static travel", "static mount force"])
 def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, quantity: str) -> None:
-    """Boxes of every size, at random and at corners."""
+    """Check boxes of every size, random designs and corners."""
     tables = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))
     tables["mounts"]["stop"] = {"gap": "4 mm", "stiffness": "1200 N/mm"}
     tables["load_cases"] = [{"name": "bump", "times_weight": [0.2, 0, -3]}, {"name": "torque", "torque": "350 N m"}]
@@ -185,7 +185,7 @@ def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, quant
 
 @pytest.mark.slow
 def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
-    """The bump of the powertrain meets its stops, full torque a limit of its own: prices of both close the boxes."""
+    """Check that prices of bump and full torque close the boxes of the powertrain."""
     result = solved("powertrain-load-cases")
     assert result.certificate.kind is Proof.GLOBAL
     bump, torque = (next(limit for limit in result.limits if name in limit.name) for name in ("bump", "full torque"))
@@ -197,7 +197,7 @@ def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
 @pytest.mark.parametrize("gap", ["none", "narrow"])
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_the_program_settles_where_the_block_does(name: str, gap: str, tmp_path: Path) -> None:
-    """Hold the rows of the program to the length at each mount in each load case, at a balance with stops."""
+    """Check that the program's rows give the travel at each mount, at a balance with stops."""
     problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, OBJECTIVES[name])
     measure, held, mounting = problem.objective[0].measure, ConstraintCollector(), mounting_in(problem.engine)
     root, numbers = mass_root(mounting.block), ca.MX.sym("d", 2)

@@ -113,7 +113,7 @@ def test_the_program_says_what_the_exact_model_says(measure, tmp_path):
 
 
 def test_unbalances_have_no_more_room_than_their_sets(tmp_path):
-    """A disc, a sector and a direction that is given: rows of the program are kept where size and angle are."""
+    """Check that the program's rows hold a disc, a sector and a given direction."""
     shaft = """
 [[balancer_shafts]]
 name = "s{k}"
@@ -204,7 +204,7 @@ class ScriptedSearch:
     ids=["better", "as good", "worse"],
 )  # fmt: skip
 def test_boxes_bound_the_best_design_of_the_search(stiffness, count, tmp_path, monkeypatch):
-    """Boxes that lead to a better design are divided once more, for the value that there is now."""
+    """Check that boxes that lead to a better design are divided again for its value."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
     values = []
 
@@ -225,7 +225,7 @@ def test_boxes_bound_the_best_design_of_the_search(stiffness, count, tmp_path, m
 
 
 def test_convex_terms_of_a_sum_are_bounded_by_their_optimum(tmp_path):
-    """The sag is least on the stiffest springs, whatever the force beside it is; the force alone has no such bound."""
+    """Check that the bound of a sum has the least sag, while the force alone has no such bound."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
     sag = Term(Measure(channels.SAG), 200.0)
     stiffest = problem.design([d.upper for d in problem.decisions])
@@ -375,7 +375,7 @@ def test_an_active_limit_on_a_load_has_a_price(tmp_path):
 
 @pytest.mark.parametrize("starts", [1, 3])
 def test_a_search_has_as_many_starts_as_it_is_given(starts, tmp_path):
-    """The design as given first, every other one within its bounds; where time is over that design is what is told."""
+    """Check that the initial design is first, the others within bounds, and that no time returns it."""
     objective = '[objective]\nminimise = "static sag"\n'
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, f"[search]\nstarts = {starts}\n")
     points, size = start_points(problem)
@@ -419,7 +419,7 @@ def test_a_search_is_refined_from_its_best_end(ends, chosen, tmp_path, monkeypat
 
 
 def test_constant_terms_are_numbers_of_the_program(tmp_path):
-    """The roll moment of the block beside open mounts has no rows: hundreds of them would be carried along."""
+    """Check that the roll moment of the block with open mounts adds no rows to the program."""
     problem = joint_problem(tmp_path, "rms", '[[constraints]]\nlimit = "static sag"\nmax = "3 mm"\n')
     alone = replace(problem, decisions=problem.mount_decisions)
     roll = Term(Measure(channels.ROLL_MOMENT, NORMS["peak to peak"]), 2.0)

@@ -102,7 +102,7 @@ def test_stars_are_counted_and_the_best_are_ranked(best, tmp_path):
 
 
 def test_the_method_counts_stars_by_how_they_were_decided(tmp_path):
-    """Stars that stand, those of the ranking that were left out, and starts whose throws were moved."""
+    """Check counts of stars that stay, of omitted ones, and of starts whose throws moved."""
     still = StarDesign(Candidate((0.0, math.pi)), evaluate_only(problem_of(tmp_path, *parts(str(STARS[0])))))
     moved = replace(still, has_moved_throws=True)
     each = "mounts and balance optimised for each of"
@@ -113,7 +113,7 @@ def test_the_method_counts_stars_by_how_they_were_decided(tmp_path):
 
 
 def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatch):
-    """The first with what is worth proving of all, the others no further than it; none where one was left out."""
+    """Check that the first star is bounded fully, the others up to it, and none if one was omitted."""
     calls = []
 
     def bounded(result, value, cutoff=math.inf, in_batch=False):
@@ -342,7 +342,7 @@ intervals = { largest_deviation = "350 deg" }
 
 @pytest.mark.slow
 def test_transmissibility_depends_on_the_firing_order(tmp_path):
-    """Gas is in what is transmitted, so that of twelve orders of one throw the even one is found."""
+    """Check that gas makes the even one of twelve firing orders of one throw the best."""
     objective = '[objective]\nminimise = "transmissibility"\n'
     problem = problem_of(tmp_path, RADIAL, BLOCK, ONE_OPEN, objective, UNBOUNDED)
     assert problem.depends_on_gas

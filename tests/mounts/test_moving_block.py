@@ -143,13 +143,13 @@ def test_the_linear_model_leaves_out_no_more_than_the_mass_that_moves():
 @pytest.mark.slow
 @pytest.mark.validation
 def test_parts_at_imposed_speed_do_not_roll_with_the_block():
-    """E1a: a flywheel of a sixth of the block's inertia, told apart and taken for a part of what rolls."""
+    """Check E1a for a flywheel of 1/6 of the block's inertia, separate from and part of the rolling mass."""
     assert left_out(0.5, 1.0) < 0.0015
     assert left_out(0.5, 1.0, turns=False) > 0.005
 
 
 def test_roll_alone_is_slower_with_what_turns_counted_in():
-    """A block that rolls on springs at its height and a wheel held at its own speed: I - J (E1a)."""
+    """Check I - J (E1a) of a block that rolls on springs with a wheel held at its speed."""
     mounts = [Mount(f"{x} {y}", (x, y, 0.0), (1e5, 1e5, 1e5)) for x in (-0.3, 0.3) for y in (-0.25, 0.25)]
     block = Block(100.0, ((6.0, 0, 0), (0, 8.0, 0), (0, 0, 8.0)), turning_inertia=0.5)
     roll = math.sqrt(4 * 1e5 * 0.25**2 / (6.0 - 0.5)) / math.tau

@@ -99,7 +99,7 @@ def test_a_convex_problem_keeps_its_proof(tmp_path: Path) -> None:
 
 
 def test_a_resonance_that_no_open_number_moves_is_refused(tmp_path: Path) -> None:
-    """Bounce at its own frequency, and only a lateral stiffness open."""
+    """Check bounce at its own frequency with only a lateral stiffness open."""
     text = f"{STRUCK!r} N/mm"
     stiff = f'stiffness = ["120 N/mm", {{ between = ["100 N/mm", "140 N/mm"] }}, "{text}"]'
     given = f'stiffness = ["120 N/mm", "120 N/mm", {{ between = ["20 N/mm", "4000 N/mm"], start = "{text}" }}]'
@@ -111,7 +111,7 @@ def test_a_resonance_that_no_open_number_moves_is_refused(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_from_the_shell(tmp_path: Path) -> None:
-    """Evaluate refuses the design, check and solve take it; what has no size is null in the file, and said in words."""
+    """Check that evaluate refuses the design, check and solve accept it, and infinite values are null."""
     resonant(tmp_path, FORCE.replace("starts = 4", "starts = 1"))
     path, out = tmp_path / "problem.toml", tmp_path / "out"
     refused = CliRunner().invoke(app, ["evaluate", str(path), "--out", str(out)])

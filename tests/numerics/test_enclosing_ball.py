@@ -26,7 +26,7 @@ def sets_of(kind: str, d: int) -> np.ndarray:
 @pytest.mark.parametrize("kind", ["anywhere", "in a line", "on a grid", "on a sphere", "in one place", "far away"])
 @pytest.mark.parametrize("d", [1, 2, 3, 6])
 def test_a_ball_holds_all_and_has_its_centre_between_points_on_it(kind: str, d: int) -> None:
-    """Both together show that none is smaller."""
+    """Check both conditions, which prove that no ball is smaller."""
     points = sets_of(kind, d)
     balls, size = enclosing_balls(points), np.abs(points).max(axis=(1, 2))
     rows = np.arange(len(points))[:, None]

@@ -36,7 +36,7 @@ class TestCis:
 
     @given(st.one_of(PARTS, st.floats(-3.0, 3.0)))
     def test_agrees_with_many_digits(self, turn: Fraction | float) -> None:
-        """To a rounding of the angle for exact parts, to a rounding of 2 pi times it for floats."""
+        """Check exact parts to a rounding of the angle, floats to a rounding of 2 pi times it."""
         with mp.workdps(40):
             exact_turn = mp.mpf(turn.numerator) / turn.denominator if isinstance(turn, Fraction) else mp.mpf(turn)
             error = float(abs(mp.mpc(cis(turn)) - mp.expjpi(2 * exact_turn)))
@@ -93,7 +93,7 @@ class TestAsTurn:
 class TestStarSum:
     @pytest.mark.parametrize("count", [*range(2, 14), 24, 48])
     def test_even_stars(self, count: int) -> None:
-        """True zeros for multiples that no whole number of turns apart, the count for those that are."""
+        """Check zeros for multiples that are no whole number of turns apart, and the count for the others."""
         turns = [Fraction(k, count) for k in range(count)]
         multiples = np.arange(4 * count + 1)
         sums = star_sum(np.ones((count, 1)), turns, multiples)[:, 0]

@@ -152,7 +152,7 @@ class TestEveryNorm:
 
     @given(rows(), st.floats(1e-3, 1e3))
     def test_dual_feasible_is_feasible(self, norm: Norm, data: tuple[np.ndarray, ...], scale: float) -> None:
-        """Whatever is proposed, what comes out is in the unit ball; what is in it already is left alone."""
+        """Check that the output is in the unit ball, and equal to an input in it."""
         weights, _, z = data
         inside = norm.dual_feasible(one_signal(weights), scale * z)
         assert norm.dual_norm(one_signal(weights), inside) <= 1.0 + ROUNDING
@@ -222,7 +222,7 @@ class TestDefinitions:
 
     @given(rows())
     def test_dual_norm_is_attained(self, name: str, data: tuple[np.ndarray, ...]) -> None:
-        """It is the smallest such factor: some V reaches it."""
+        """Check that some V reaches the dual norm."""
         weights, _, z = data
         grid, norm = Grid(weights + 0.1, 1), NORMS[name]
         v = ATTAINING[name](grid.weights, z)
@@ -301,7 +301,7 @@ class TestForms:
 
     @given(rows(), st.floats(0.1, 10.0))
     def test_smooth_form_is_off_by_its_share(self, norm: Norm, data: tuple[np.ndarray, ...], unit: float) -> None:
-        """Never over the norm, and under it by no more than the share of the unit (N3, E22)."""
+        """Check that it is not above the norm, nor below by more than the share of the unit (N3, E22)."""
         weights, v, _ = data
         grid, share, program = Grid((weights + 0.1) / (weights + 0.1).sum(), len(weights)), 1e-3, AtItsValues()
         exact, smooth = norm.value(grid, v), float(norm.smooth_expression(program, grid, ca.DM(v), unit, share))
@@ -312,7 +312,7 @@ class TestForms:
 
     @given(rows(), st.floats(0.1, 10.0))
     def test_smooth_limit_is_the_limit(self, norm: Norm, data: tuple[np.ndarray, ...], size: float) -> None:
-        """Kept by what is a little inside, broken by what is a little outside; its slope is that of its own side."""
+        """Check points just inside and outside, and the slope of each side."""
         weights, v, _ = data
         grid = Grid((weights + 0.1) / (weights + 0.1).sum(), len(weights))
         whole = norm.value(grid, v)

@@ -152,7 +152,7 @@ class TestSpectrumOf:
 
     @given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=17))
     def test_goes_through_every_sample(self, samples: list[float]) -> None:
-        """Even and odd numbers of samples, one and two among them."""
+        """Check even and odd numbers of samples, one and two among them."""
         values = np.array(samples)[:, None]
         np.testing.assert_allclose(spectrum_of(values, Fraction(1, 2)).sample(len(values)), values, atol=1e-12)
 

@@ -69,7 +69,7 @@ def test_processes_answer_and_pass_errors_on() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
 def test_calls_are_worked_on_side_by_side(tmp_path: Path) -> None:
-    """Each ends when it is told to alone; who asks which processes run may do so while they begin."""
+    """Check that calls end independently, and that running processes can be listed while they start."""
     pipes = [tmp_path / str(k) for k in range(3)]
     with Processes(len(pipes)) as pool, ExitStack() as ends:
         for pipe in pipes:

@@ -166,7 +166,7 @@ def test_waves_and_windows_are_those_of_the_exact_model(text: str, gas: str, nam
     ],
 )
 def test_no_design_in_a_box_of_throws_and_angles_goes_under_its_bound(text: str, rest: str) -> None:
-    """Small and large boxes around random designs, unbalances at their proven optimum."""
+    """Check boxes around random designs with unbalances at their proven optimum."""
     problem, rng, seen = _read(text + MOUNTS + rest), np.random.default_rng(4), 0
     phasing, windows = problem.phasing, windows_of(problem, problem.phasing)
     programs = ThrowSearch(problem, phasing, windows, lambda _: None, None).roots[0][0].programs
@@ -203,7 +203,7 @@ CASES = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("text", "of_bank", "gas", "name"), CASES)
 def test_no_angle_is_better_than_the_bound(text: str, of_bank: bool, gas: str, name: str) -> None:
-    """Cones at fixed angles, and the bound meets the design."""
+    """Compare the bound with cone programs at fixed angles, and with the design."""
     # of a pressure few samples know too little for the last digits
     steps = changed(FEW, "360", "720") if gas else FEW
     problem = _read(text + gas + MOUNTS + WEIGHTS + steps + _objective(name))

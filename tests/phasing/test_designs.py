@@ -111,7 +111,7 @@ def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, b
 
 
 def test_a_shaft_that_has_to_be_heavy_is_left_out_where_it_harms(tmp_path):
-    """Beside one that may weigh nothing: against every star with every set of shafts that is allowed."""
+    """Compare with every star and every allowed set of shafts, one of which may weigh nothing."""
     heavy = engines.shaft("against", -1).replace('"0 kg m"', '"0.09 kg m"', 1).replace("{ between = [0, 360] }", "0")
     rest = engines.MOUNTS + heavy + engines.shaft("second", 2) + engines.MOUNT_FORCE
     problem = engines.problem(tmp_path, 3, rest=rest)
@@ -133,7 +133,7 @@ def test_a_shaft_that_no_design_needs_is_not_built(tmp_path):
 
 
 def test_a_limit_that_nothing_open_moves_leaves_a_star_its_optimum(tmp_path):
-    """Beside one that binds: the design and its bound are those without it."""
+    """Check that design and bound equal those without the constant limit, with another one active."""
     fixed = '[[constraints]]\nlimit = "mean mount force"\norders = [2]\nmax = "1e6 N"\n'
     binding = CASES["limited"].partition("[[constraints]]")
     found = []

@@ -39,7 +39,7 @@ def with_choice(tmp_path, name, old, new):
 
 
 def test_two_stroke_four_with_a_shaft():
-    """Hasselgruber, Figs. 26 to 28: the star with U s / (m r a / 2) = sqrt 10, nothing of order 1 and 2 left."""
+    """Check Hasselgruber, figs. 26 to 28: U s / (m r a / 2) = sqrt 10, no order 1 and 2."""
     problem = load(PROBLEMS / "two-stroke-four-open.toml")
     result = solve(problem)
     assert result.status is Status.OPTIMAL
@@ -60,7 +60,7 @@ def test_two_stroke_four_with_a_shaft():
 
 @pytest.mark.slow
 def test_two_stroke_four_without_a_shaft(tmp_path):
-    """Hasselgruber: without a shaft the star with sqrt 2 is better."""
+    """Check Hasselgruber's star with sqrt 2, better without a shaft."""
     text = (PROBLEMS / "two-stroke-four-open.toml").read_text(encoding="utf-8")
     head, shafts = text.split("# ... and this one against it")
     path = tmp_path / "none.toml"
@@ -82,7 +82,7 @@ def test_four_stroke_four_and_six(tmp_path, cylinders, star):
 
 
 def test_cross_plane_eight():
-    """90 degree V8: with counterweights free the cross-plane crank, nothing of order 1 and 2 left."""
+    """Check a 90 degree V8 with free counterweights: the cross-plane crank without orders 1 and 2."""
     result = solved("vee-eight-open")
     assert result.status is Status.OPTIMAL
     best = result.phasing.ranking[0]
@@ -96,7 +96,7 @@ def test_cross_plane_eight():
 
 
 def test_split_pins_of_a_six():
-    """90 degree V6: 30 degree split pins, the only ones that fire evenly."""
+    """Check a 90 degree V6 with 30 degree split pins, the only ones that fire evenly."""
     result = solved("vee-six-open")
     assert result.status is Status.OPTIMAL
     assert next(d.value for d in result.decisions if d.name == "split pin angle") == pytest.approx(math.radians(30.0))
@@ -138,7 +138,7 @@ def test_least_couples_of_in_line_engines(cycle, cylinders):
 
 
 def test_published_couples():
-    """Textbook example 5 and the free couples of a two-stroke seven."""
+    """Check textbook example 5 and the free couples of a two-stroke seven."""
     five = solved("inline-five-open").phasing.ranking[0]
     assert five.couples[:2] == pytest.approx((0.4490, 4.9798), abs=1e-4)
     layout = inline(7, 1.0)

@@ -45,7 +45,7 @@ def unbalances(engine: Engine) -> np.ndarray:
 
 @pytest.mark.parametrize("own", [(0.01, 0.08), (-0.08, -0.01), (-0.05, 0.03), (0.0, 0.06), (-0.06, 0.0), (0.02, 0.02)])
 def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[float, float], tmp_path: Path) -> None:
-    """Random values of every kind of decision; an interval may lie on either side of nothing, or around it."""
+    """Check random values of every kind of decision, with intervals on both sides of zero and around it."""
     problem = engines.problem(
         tmp_path, 3, "two-stroke", engines.OPEN, 'intervals = { largest_deviation = "25 deg" }',
         STILL + engines.MOUNTS + engines.MOUNT_FORCE, "inline", 96,

@@ -111,7 +111,7 @@ def best_of(phasing, window, throws):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_no_design_in_a_box_goes_under_its_bound(tmp_path, name):
-    """Small and large boxes around random cranks, unbalances at their proven optimum."""
+    """Check boxes around random cranks with unbalances at their proven optimum."""
     problem, phasing, windows = scene(tmp_path, name)
     rng = np.random.default_rng(5)
     programs = programs_of(problem, phasing, windows[0])
@@ -137,7 +137,7 @@ def test_no_design_in_a_box_goes_under_its_bound(tmp_path, name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["couple", "gas", "limited", "riders", "vee with gas"])
 def test_no_better_crank_is_cut_off(tmp_path, name):
-    """A box is cut down to where something may be better than a value: a better crank stays inside."""
+    """Check that a box cut down to a value keeps all better cranks."""
     problem, phasing, windows = scene(tmp_path, name)
     rng = np.random.default_rng(8)
     window = windows[-1]
@@ -181,7 +181,7 @@ def test_waves_add_up_to_the_exact_loads(tmp_path, name):
 @pytest.mark.parametrize(("layout", "cycle", "count"), [("inline", "two-stroke", 4), ("inline", "four-stroke", 4),
                                                         ("vee", "four-stroke", 6)])  # fmt: skip
 def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
-    """Random cranks, all firing orders that they can have: in one window where intervals are kept, else in none."""
+    """Check that every firing order of a random crank is in one window if its intervals are allowed, else in none."""
     engine = VEE if layout == "vee" else engines.OPEN
     problem = engines.problem(
         tmp_path, count, cycle, engine, ALLOWED, engines.MOUNTS + GAS + engines.MOUNT_FORCE, layout
@@ -215,7 +215,7 @@ def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
 @pytest.mark.parametrize("beside", [0, 1, 2])
 @pytest.mark.parametrize("seed", range(3))
 def test_arcs_are_never_less_than_their_least(seed, beside):
-    """A sum over throws that share open angles, at random angles of a box: above the least, and inside what is kept."""
+    """Check sums over throws with shared open angles at random angles against their least."""
     rng = np.random.default_rng(seed)
     orders = np.column_stack([[0.5, 1.0, 2.0, 3.5, 6.0], rng.uniform(-4.0, 4.0, (5, beside))])
     waves = rng.standard_normal((3, 5)) + 1j * rng.standard_normal((3, 5))
@@ -273,7 +273,7 @@ def test_steps_over_the_cycle_do_not_hold_a_bound_back(tmp_path):
 
 @pytest.mark.slow
 def test_a_limit_that_no_crank_keeps_is_named(tmp_path):
-    """Just under the proven least couple nothing is allowed, and that is proven; just above it is."""
+    """Check limits just below the least couple (proven infeasible) and just above it."""
     limit = LIMIT % ("rms rocking couple", "{:.6f} N m") + 'orders = [1, 2]\nname = "couple"\n'
     allowed = 'intervals = { largest_deviation = "3 deg" }'
     best = solve(engines.problem(tmp_path, 5, "four-stroke", phasing=allowed))

@@ -34,7 +34,7 @@ SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0,
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["inline-seven-uneven", "inline-nine-uneven", "two-stroke-eight-uneven"])
 def test_slightly_uneven_angles_cut_the_couple(name):
-    """The marine trick: a few degrees take most of the couple."""
+    """Check that a few degrees take most of the couple, as in marine engines."""
     problem, result = load(PROBLEMS / f"{name}.toml"), solved(name)
     allowed = problem.phasing.intervals
     intervals = result.final.engine.firing_intervals
@@ -68,7 +68,7 @@ def test_a_ranking_has_no_crank_twice(name):
 
 @pytest.mark.slow
 def test_zero_is_reached_cleanly():
-    """Four-stroke nine: both couples vanish within the intervals, and below zero there is nothing."""
+    """Check a four-stroke nine: both couples vanish within the intervals, with a bound of zero."""
     result = solved("inline-nine-uneven")
     assert result.objective.value <= 1e-6 * result.phasing.even_value
     assert result.certificate.kind is Proof.GLOBAL
@@ -210,7 +210,7 @@ def test_bank_and_split_pins_move_within_bounds(tmp_path):
 
 @pytest.mark.parametrize("directions", [1, 31, 32, 33, 100])
 def test_the_least_bound_of_stars_is_that_of_all_directions(directions):
-    """Whatever of them a few directions show to be no better, and whatever is known of others."""
+    """Compare the least bound of stars, also with a known bound, with the bounds of all directions."""
     rng = np.random.default_rng(directions)
     for size in (1e-3, 1.0, 1e3):
         costs = size * rng.normal(size=(directions, 4, 5))

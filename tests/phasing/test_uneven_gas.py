@@ -185,7 +185,7 @@ def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
 
 @pytest.mark.parametrize(("orders", "stays"), [("orders = [1, 2]", True), ("", False)])
 def test_even_firing_stays_where_it_is_best(tmp_path, orders, stays):
-    """Gas alone: even firing cancels orders 1 and 2 of three cylinders, but adds up order 3."""
+    """Check gas alone: even firing cancels orders 1 and 2 of three cylinders and adds up order 3."""
     rest = GAS + f'[objective]\nminimise = "rms roll moment"\n{orders}\n'
     phasing = engines.problem(tmp_path, 3, phasing=ALLOWED, rest=rest).phasing
     light = replace(phasing, problem_of=lambda candidate: _light(phasing.problem_of(candidate)))
@@ -214,7 +214,7 @@ def _light(problem):
 
 
 def test_the_bound_is_the_steady_torque(tmp_path):
-    """Work of the cycle over its angle: imep times what all cylinders displace, on any star."""
+    """Check the bound of imep times displacement over the angle of the cycle, on any star."""
     rest = GAS + '[search]\nboxes = 4\n[objective]\nminimise = "rms roll moment"\n'
     allowed = 'intervals = { largest_deviation = "5 deg" }\nbest = 1'
     problem = engines.problem(tmp_path, 3, phasing=allowed, rest=rest)

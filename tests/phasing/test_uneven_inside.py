@@ -87,7 +87,7 @@ SCENES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Throws, bank, split pin and weight drawn at random; every order kept."""
+    """Check random throws, bank, split pin and weight with every order."""
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 1e-9)
     monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
     engine, throws, settings = SCENES[name]
@@ -113,7 +113,7 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
 
 @pytest.mark.slow
 def test_waves_of_throws_are_those_of_the_exact_model() -> None:
-    """In any firing window, at any throws: one cylinder may load the places of another."""
+    """Check any firing window and throws, with one cylinder loading places of another."""
     rng = np.random.default_rng(3)
     cases = [(problem_of({"throws": "open", "firing_order": "open", "cylinders": 3}, f"rms {load}",
                          counterweights=[{"name": "web", "x": "20 mm", "opposite_throw": 2, "unbalance": "0.1 kg m"}],
@@ -180,7 +180,7 @@ def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
 
 @pytest.mark.slow
 def test_a_bank_that_is_open_beside_its_bearings() -> None:
-    """A vee twin: no bank of a grid goes under the bound, and none is better by more than the gap of the grid."""
+    """Check a vee twin against a grid of banks, for bound and value."""
     problem = problem_of(TWIN, "mean main-bearing force", 1, counterweights=None,
                          phasing={"intervals": {"min": "100 deg", "max": "620 deg"}})  # fmt: skip
     result = laufruhe.solve(problem)
@@ -198,7 +198,7 @@ def test_a_bank_that_is_open_beside_its_bearings() -> None:
 
 @pytest.mark.slow
 def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
-    """Between what the best bearings and the most even crank have: kept, and not far from the best of a grid."""
+    """Check a limit between the best bearings and the most even crank, near the best of a grid."""
     even = decided("degree of irregularity")[1]
     degree = even.problem.objective[0].measure
     maximum = 0.3 * even.objective.initial + 0.7 * even.objective.value
@@ -269,7 +269,7 @@ def test_firing_orders_beside_a_spring_that_is_open() -> None:
 
 @pytest.mark.slow
 def test_throws_that_move_beside_a_spring_that_is_open() -> None:
-    """No worse than any throw and stiffness of a grid by more than the tolerance of a local search."""
+    """Compare with a grid of throws and stiffnesses within the tolerance of a local search."""
     settings = ELASTIC | {"counterweights": None, "objective": BOTH}
     crank = {"throws": [0, {"between": [100, 140]}, 240], "firing_order": [1, 3, 2]}
     problem = problem_of(crank, "", **settings)

@@ -41,7 +41,7 @@ def test_it_is_what_the_key_of_that_name_makes(text: str, throws: int) -> None:
 
 
 def test_a_workshop_counts_the_same() -> None:
-    """1.3 kg at 50 mm on a throw of 45 mm: (65 - 0.4 45) / (0.6 45), in kg mm."""
+    """Check 1.3 kg at 50 mm on a throw of 45 mm: (65 - 0.4 45) / (0.6 45), in kg mm."""
     result = balance_factors(engine(SINGLE, 'name = "web"\nopposite_throw = 1\nmass = "1.3 kg"\nradius = "50 mm"'))
     assert [one.factor for one in result] == pytest.approx([(65.0 - 18.0) / 27.0], rel=1e-12)
 

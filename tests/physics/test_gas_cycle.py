@@ -101,7 +101,7 @@ class TestMeanPressure:
     @every_part
     @every_cycle
     def test_smooth_pressure_is_integrated_to_rounding(self, part: SliderCrank, cycle: Cycle) -> None:
-        """p = p0 + p1 dv/dgamma gives p1 times the integral of the square of the rate."""
+        """Check p = p0 + p1 dv/dgamma: p1 times the integral of the squared rate."""
         angles = cycle.angle * np.arange(256) / 256
         mean = indicated_mean_pressure(3 * BAR + BAR * swept_rate(part, angles), part, cycle)
         exact = cycle.turns * mpmath.quad(

@@ -169,7 +169,7 @@ class TestTwoMounts:
         np.testing.assert_allclose(result, [[0, 350, -150], [0, 350, -150]], atol=1e-10)
 
     def test_mounts_below_the_crank(self) -> None:
-        """A lateral force on the crank axis rolls the engine on mounts that lie h below: h F / b up and down."""
+        """Check h F / b up and down for a lateral force F on the crank axis, h above the mounts."""
         low = [replace(m, position=(0.0, m.position[1], -0.1)) for m in PAIR]
         result = forces(low, np.array([0.0, 700.0, 0.0, 0.0, 0.0, 0.0], dtype=complex))
         lift = 700.0 * 0.1 / 0.504

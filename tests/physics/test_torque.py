@@ -240,7 +240,7 @@ def test_irregularity_is_that_of_the_motion_in_time() -> None:
 
 @pytest.mark.parametrize("name", ["tractor-four-bearings", "tractor-single", "radial-seven"])
 def test_parts_of_the_torque_add_up(name: str) -> None:
-    """Gas has the mean, pistons and rods none; a rod's inertia is what rigid rods have over two masses."""
+    """Check that gas has the mean, pistons and rods none, and the rod inertia over two masses."""
     engine, point = case(name)
     parts = torque_parts(engine, point)
     total = parts["gas"] + parts["pistons"] + parts["rods"]

@@ -67,7 +67,7 @@ def test_values_that_grow_by_a_factor_stand_on_a_logarithmic_axis(speeds: list[f
 def test_a_sweep_says_what_its_points_are(
     cases: list[str], speeds: dict[str, list[object]], at: str, words: str
 ) -> None:
-    """And not that its engines have equal cylinders, which says nothing of one engine with two limits."""
+    """Check that one engine with two limits is not described as engines of equal cylinders."""
     data = part([2.0, 1.0], ["global"] * 2, **speeds).assign_coords(case=("point", cases)).assign_attrs(at=at)
     assert KINDS["layout comparison"].picture(data).words == words
 

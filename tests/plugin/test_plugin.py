@@ -51,7 +51,7 @@ def laufruhe(environment: dict[str, str], *words: str | Path) -> subprocess.Comp
 
 
 def test_the_norm_of_a_package_stays_below_its_bound() -> None:
-    """A sine of two amplitudes, whose orders add up at one angle."""
+    """Check a sine of two amplitudes whose orders add up at one angle."""
     path = HERE / "laufruhe_example" / "worst_twentieth.py"
     spec = importlib.util.spec_from_file_location("worst_twentieth", path)
     assert spec is not None
@@ -86,7 +86,7 @@ def test_a_problem_of_a_package_is_checked_and_solved(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_decision_of_a_package_is_decided(tmp_path: Path) -> None:
-    """The weight given balances a crank radius of 45 mm."""
+    """Check that the decided weight balances a crank radius of 45 mm."""
     text = PROBLEM.read_text(encoding="utf-8").replace('{ between = ["0 kg m", "0.3 kg m"] }', f'"{UNBALANCE} kg m"')
     text += '\n[quantities]\ncrank_radius = { between = ["40 mm", "50 mm"], start = "41 mm" }\n'
     (tmp_path / "radius.toml").write_text(text, encoding="utf-8")

@@ -196,7 +196,7 @@ def test_a_file_created_in_the_meantime_stays(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("locks", [True, False])
 def test_a_run_that_works_is_not_swept_away(locks: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor where no lock tells whether it works."""
+    """Check a running process, also where no lock shows it."""
     if not locks:
         monkeypatch.setattr("laufruhe.numerics.locks.fcntl", None)
     with staged(FileSet(tmp_path / "set", "--out", "solve", NAMES)) as first:

@@ -154,7 +154,7 @@ def test_a_number_that_is_not_finite_is_null(odd: float) -> None:
 
 
 def test_every_order_is_written() -> None:
-    """Small ones too, in full precision: what is read back adds up to the loads."""
+    """Check that all orders, read back in full precision, add up to the loads."""
     result = scenes.solved(scenes.TIGHT)
     written, wrench = parsed(result)["shaking"], result.final.loads[0].wrench
     used = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))

@@ -56,7 +56,7 @@ def test_a_peak_between_angles_keeps_its_limit() -> None:
 
 
 def test_designs_of_equal_loads_end_at_the_lightest() -> None:
-    """Sizes of 1 and 1e11 within far wider bounds are both needed; a weight that nothing feels goes."""
+    """Check sizes of 1 and 1e11 within wide bounds, and that a weight without effect goes."""
     sets = [Interval(-1e12, 1e12), Interval(-1e13, 1e13), Interval(-1.0, 1.0), Interval(-1.0, 1.0)]
     decisions = [Decision(str(k), "kg m", own, 0.0, (RotorDrive(str(k), 1.0),)) for k, own in enumerate(sets)]
     slope = np.zeros((2, 1, 4))

@@ -148,7 +148,7 @@ STOPPED = {
 
 @pytest.mark.parametrize("status", STOPPED)
 def test_a_solver_that_gives_up_is_not_the_end(status: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A design is left, no worse than the one given, with the bound that holds; nothing is called impossible."""
+    """Check that a failing solver leaves a design no worse than the initial one, with its bound."""
     word, value = STOPPED[status]
 
     def failing(rows: Any, cost: Any, *_: Any) -> Any:
@@ -231,7 +231,7 @@ orders = [2]
     ],
 )
 def test_loads_at_rounding_level_are_proven(throws: list[float], objective: str, upper: float, tmp_path: Path) -> None:
-    """Nothing to gain, in loads of 1e-12 N beside those of bounds of any size: an optimum, and proven."""
+    """Check loads of 1e-12 N, with nothing to gain, under bounds of any size."""
     problem = loaded(tmp_path, BALANCED.format(throws=throws, upper=upper, asked=objective))
     result = laufruhe.solve(problem)
     assert result.objective is not None

@@ -183,7 +183,7 @@ def test_an_optimum_that_breaks_its_limits_is_not_claimed(kind: str, monkeypatch
 
 
 def test_loads_that_are_not_unique_are_left_to_the_cones() -> None:
-    """Two places whose forces point one way: what one gains the other loses."""
+    """Check two places with parallel forces, of which one gains what the other loses."""
     angle = 2.0 * np.pi * np.arange(ROWS) / ROWS
     along = np.stack([2.0 + np.cos(angle), np.sin(angle)], axis=1)
     constant = np.concatenate([along, along])
@@ -208,7 +208,7 @@ def test_loads_that_cancel(name: str) -> None:
 
 
 def test_a_mass_in_the_objective_where_nothing_is_to_be_gained() -> None:
-    """Forces of another order than those of the weights: the gradient of the mean is a rounding error."""
+    """Check a mass in the objective beside forces of order 3, which no weight reduces."""
     angle = 2.0 * np.pi * np.arange(ROWS) / ROWS
     constant = np.stack([np.cos(3.0 * angle), np.sin(3.0 * angle)], axis=1)
     turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)

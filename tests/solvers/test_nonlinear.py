@@ -50,7 +50,7 @@ def test_a_start_whose_time_is_over_stops_where_it_is_and_the_next_does_not():
 
 
 def test_the_ends_of_starts_are_described():
-    """Also where none converged, or there was one start alone."""
+    """Check texts also for no convergence and for one start."""
     starts = [np.array([-1.0, 1.0]), np.array([0.5, 0.5])]
     stopped = solve_nonlinear(rosenbrock(), starts, max_seconds=0.0)
     met = solve_nonlinear(rosenbrock(), starts)
@@ -206,7 +206,7 @@ def test_one_of_equal_starts_goes_on_and_no_optimum_is_lost():
 
 
 def test_dependent_variables_distinguish_no_optima():
-    """Its sign may be either, as that of the shape of a mode."""
+    """Check a variable of either sign, as that of the shape of a mode."""
     x, e = ca.SX.sym("x", 2), ca.SX.sym("e")
     program = NonlinearProgram(
         x, (x[0] - 0.3) ** 2 - e, np.array([-4.0, -2.0]), np.array([4.0, 2.0]), constraints=x[1] ** 2,

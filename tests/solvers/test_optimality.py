@@ -52,7 +52,7 @@ OBJECTIVES = pytest.mark.parametrize("objective", [MEAN_MOUNT_FORCE, PEAK, RMS],
 
 @OBJECTIVES
 def test_no_feasible_design_is_better(objective: Measure) -> None:
-    """Random designs, near and far, lie above the optimum and above its bound."""
+    """Check that random designs, near and far, are above the optimum and its bound."""
     p = four(objective, upper=0.008)
     result = solve(p)
     assert result.objective is not None
@@ -76,7 +76,7 @@ def test_no_feasible_design_is_better(objective: Measure) -> None:
 
 @OBJECTIVES
 def test_scipy_does_not_find_better(objective: Measure) -> None:
-    """SLSQP on the exact model, from the design as given and from the optimum."""
+    """Compare with SLSQP on the exact model, from the initial design and from the optimum."""
     p = four(objective)
     result = solve(p)
     assert result.objective is not None
@@ -90,7 +90,7 @@ def test_scipy_does_not_find_better(objective: Measure) -> None:
 
 
 def test_gap_is_computed_from_the_exact_model() -> None:
-    """Objective and bound recomputed here from rows of the exact model, without the solver's numbers."""
+    """Compare objective and bound with rows of the exact model, without the solver's numbers."""
     p = four(tolerance=1e-5)
     result = solve(p)
     assert result.objective is not None
@@ -104,7 +104,7 @@ def test_gap_is_computed_from_the_exact_model() -> None:
 @pytest.mark.parametrize("samples", [48, 96, 360])
 @pytest.mark.parametrize("subject", [channels.MOUNT_FORCE, channels.ROLL_MOMENT, channels.SHAKING_FORCE])
 def test_bound_of_a_mean_holds_over_the_whole_cycle(subject: LoadChannel, samples: int) -> None:
-    """However few the angles: the mean over the cycle of the design found, and of any near it, is not below (P7)."""
+    """Check at any number of angles that no mean over the cycle is below the bound (P7)."""
     p = replace(four(Measure(subject, NORMS["mean"]), tolerance=0.3), fidelity=Fidelity("exact", samples))
     result = solve(p)
     assert result.certificate is not None
@@ -140,7 +140,7 @@ def test_a_wrong_answer_gets_a_wide_gap() -> None:
 
 @pytest.mark.slow
 def test_shadow_price_is_the_slope_of_the_optimum() -> None:
-    """The price of a mass limit against finite differences of proven optima."""
+    """Compare the price of a mass limit with finite differences of proven optima."""
 
     def at(kg: float) -> float:
         result = solve(four(limits=(Limit("mass", BALANCER_MASS, kg),), tolerance=1e-6))
@@ -160,7 +160,7 @@ def test_shadow_price_is_the_slope_of_the_optimum() -> None:
 
 @pytest.mark.slow
 def test_price_of_a_bound_is_the_slope_of_the_optimum() -> None:
-    """The price of a largest unbalance against finite differences."""
+    """Compare the price of a largest unbalance with finite differences."""
 
     def at(upper: float) -> tuple[float, float]:
         result = solve(four(upper=upper, tolerance=1e-6))
@@ -190,7 +190,7 @@ def test_limits_hold_between_the_samples_and_bind() -> None:
 
 
 def test_infeasible_names_the_limits_in_conflict_and_no_others() -> None:
-    """Two limits that contradict, a third that has nothing to do with it."""
+    """Check two limits that contradict and a third without part in it."""
     limits = (
         Limit("peak force", PEAK, 900.0),
         Limit("balancer mass", BALANCER_MASS, 0.05),
@@ -205,7 +205,7 @@ def test_infeasible_names_the_limits_in_conflict_and_no_others() -> None:
 
 @pytest.mark.parametrize("samples", [48, 180])
 def test_a_limit_broken_only_at_finer_angles_is_a_conflict(samples: int) -> None:
-    """A largest roll moment that nothing open changes, a hair under its peak: met at many angles, not between.
+    """Check a constant limit on the roll moment a hair below its peak, met only at few angles.
 
     The limit in conflict is named alone, and one at the peak itself is met.
     """
@@ -222,7 +222,7 @@ def test_a_limit_broken_only_at_finer_angles_is_a_conflict(samples: int) -> None
 
 
 def test_the_lightest_of_equal_designs_is_returned() -> None:
-    """Counterweights that no mount feels stay off, shafts that can share do not fight each other."""
+    """Check that weights without effect stay off and that equal shafts share their load."""
     rotors = [shaft_rotor("left", 2, 0.0, 0.1), shaft_rotor("right", -2, 0.0, -0.1)]
     rotors += [web("a", 0.2), web("b", -0.2), web("c", 0.0)]
     machine = engine(FOUR, rotors, firing_order=[1, 3, 4, 2])
@@ -234,7 +234,7 @@ def test_the_lightest_of_equal_designs_is_returned() -> None:
 
 
 def test_sampling_does_not_decide() -> None:
-    """Optimum at a coarse fidelity, measured at a fine one, is the fine optimum to the tolerance."""
+    """Compare the optimum at a coarse fidelity, measured at a fine one, with the fine optimum."""
     fine = solve(replace(four(), fidelity=Fidelity("exact", 5760)))
     coarse = solve(replace(four(), fidelity=Fidelity("exact", 720)))
     assert fine.objective is not None
@@ -300,7 +300,7 @@ def test_brute_force_over_size_and_angle() -> None:
 
 @pytest.mark.parametrize("magnitude", [1e-6, 1e6])
 def test_bounds_far_from_the_answer(magnitude: float) -> None:
-    """Huge and tiny bounds beside each other leave the program solvable and the proof honest."""
+    """Check that huge and tiny bounds leave the program solvable and the proof right."""
     p = four()
     odd = Decision("x", "kg m", Sector(0.01 * magnitude), 0j, p.decisions[1].drives)
     result = solve(replace(p, decisions=(p.decisions[0], odd)))
@@ -311,7 +311,7 @@ def test_bounds_far_from_the_answer(magnitude: float) -> None:
 
 
 def test_a_limit_that_nothing_open_acts_on_changes_nothing() -> None:
-    """Over its edge by a rounding it is kept, and takes no part in the bound."""
+    """Check that a constant limit broken by a rounding is kept, and has no part in the bound."""
     roll = Measure(channels.ROLL_MOMENT, NORMS["peak to peak"], orders=(4.0, 6.0))
     free = solve(four())
     whole = free.final.value(roll)

@@ -155,7 +155,7 @@ def test_with_a_counterweight_more_freedom_is_never_worse(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_masses_at_an_uneven_speed_are_decided_locally(tmp_path: Path) -> None:
-    """No mass of a grid is better."""
+    """Check that no mass of a grid is better."""
     text = VEE + 'crank_inertia = "1 kg m^2"\n[search]\nstarts = 1\n' + objective("mean mount force")
     problem = loaded(tmp_path, text)
     result = laufruhe.solve(problem)

@@ -22,7 +22,7 @@ def moved(slope: Array, rows: list[Array], k: int, by: float) -> float:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_prices_are_what_the_optimum_moves_by(seed: int) -> None:
-    """Smooth limits, limits with a kink and edges, as many as hold the optimum and more."""
+    """Check smooth limits, limits with a kink and edges, some of them inactive."""
     random = np.random.default_rng(seed)
     kinds = [(1, 1, 1), (2, 1, 1), (1, 2, 1), (2, 2, 1)][seed % 4]
     rows = [random.normal(size=(count, 3)) for count in kinds]

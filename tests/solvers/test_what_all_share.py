@@ -75,7 +75,7 @@ OPEN = {
 @pytest.mark.parametrize("attainable", [True, False])
 @pytest.mark.parametrize("what", OPEN)
 def test_limits_that_nothing_open_acts_on(what: str, attainable: bool, tmp_path: Path) -> None:
-    """They stand beside the others in the result where they are kept, and are named where no design keeps them."""
+    """Check that kept limits are in the result, and that broken ones are named."""
     acts_on_sag = what == "stiffness"
     broken = "rms shaking force" if acts_on_sag else "static sag"
     sag, force = "5 mm", "5000 N"
@@ -94,7 +94,7 @@ def test_limits_that_nothing_open_acts_on(what: str, attainable: bool, tmp_path:
 
 @pytest.mark.parametrize("minimum", ["1 N", "3500 N"])
 def test_limits_that_unbalances_cannot_keep_whatever_the_mounts(minimum: str, tmp_path: Path) -> None:
-    """Mounts do not move what the block feels: no search of them is needed to tell what no unbalance keeps."""
+    """Check that a limit on the shaking force, which mounts do not change, is infeasible at 1 N."""
     tables = {**OPEN["stiffness"], "throws": [0, 0], "more": WEB}
     result = solve(loaded(tmp_path, BLOCK.format(sag="5 mm", force=minimum, **tables)))
     if minimum == "1 N":
@@ -105,7 +105,7 @@ def test_limits_that_unbalances_cannot_keep_whatever_the_mounts(minimum: str, tm
 
 
 def test_a_design_worse_than_the_one_given_is_not_proposed() -> None:
-    """Whatever a method proposes: the design as given takes its place, with the bound that was proven."""
+    """Check that the initial design replaces a worse proposal, with the proven bound."""
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     given = evaluate(problem)
     worse = evaluate_design(problem, [-decision.upper for decision in problem.decisions])
@@ -122,7 +122,7 @@ def test_a_design_worse_than_the_one_given_is_not_proposed() -> None:
 
 @pytest.mark.parametrize("what", [what for what in OPEN if what != "nothing"])
 def test_nothing_minimised_is_refused(what: str, tmp_path: Path) -> None:
-    """Whatever is open, in one line."""
+    """Check one line for any open numbers."""
     problem = loaded(tmp_path, BLOCK.format(sag="5 mm", force="5000 N", **OPEN[what]))
     with pytest.raises(ModelError, match="is open, but there is no objective"):
         solve(problem.changed(objective=(), limits=()))

@@ -27,7 +27,7 @@ def ran(*words: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.slow
 def test_scripts_can_be_imported_and_too_small_studies_are_refused():
-    """A hundredth of four scenes was none, and its study failed after minutes."""
+    """Check imports, and the refusal of 4 scenes, of which a hundredth is none."""
     names = ", ".join(sorted(path.stem for path in SCRIPTS.glob("*.py")))
     done = ran("-c", f"import {names}; bench_cluster.main()", "--solves", "4")
     assert done.returncode == 2, done.stderr

@@ -43,7 +43,7 @@ def test_the_lowest_versions_are_tested_by_files_that_exist() -> None:
 
 
 def test_the_lowest_versions_are_those_that_are_tested() -> None:
-    """Each as pyproject.toml has it, all others as in constraints.txt where they may be."""
+    """Compare with pyproject.toml, and with constraints.txt for all others."""
     lowest = dict(_pins("constraints-lowest.txt"))
     extras = PROJECT["optional-dependencies"]
     assert extras["all"] == [f"laufruhe[{','.join(sorted(set(extras) - {'all'}))}]"]
@@ -71,7 +71,7 @@ def _plain(name: str) -> str:
 
 @pytest.mark.slow
 def test_a_wheel_carries_its_data(tmp_path: Path) -> None:
-    """Schemas, engines, the page of reports, every ready problem with what it refers to; and it works from there."""
+    """Check schemas, engines, the page of reports and ready problems in the wheel, and a run from it."""
     build = f"import hatchling.build as h; print(h.build_wheel({str(tmp_path)!r}))"
     subprocess.run([sys.executable, "-c", build], cwd=ROOT, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")

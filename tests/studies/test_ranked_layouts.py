@@ -69,7 +69,7 @@ def test_values_equal_on_the_page_share_a_place() -> None:
 
 @pytest.mark.slow
 def test_engines_are_ranked_by_what_their_designs_do(data: xr.Dataset) -> None:
-    """Numbers anew from the problem files, and the least is first; a radial has bearings as the others do."""
+    """Compare with numbers of the problem files, least first; a radial has bearings too."""
     assert data["proof"].values.tolist() == ["global"] * 3
     assert data["quantity"].values.tolist() == RANKED
     boxer = at_equal_power(load_tables({**tables("boxer"), "engine": {

@@ -82,7 +82,7 @@ SPEEDS = swept(SPEED, 'from = "6 m/s"\nto = "12 m/s"\npoints = {}')
 
 
 def test_every_kind_is_computed_and_shown() -> None:
-    """A kind says of itself all that is asked of one."""
+    """Check each kind of study by what it declares."""
     homes = HOMES["study_kinds"].items()
     there = {name for name, home in homes if (Path(laufruhe.__file__).parent / "extensions" / home).exists()}
     assert set(KINDS) == {"percentile", *there}
@@ -190,7 +190,7 @@ def test_nothing_open_is_not_called_an_optimum(tmp_path: Path) -> None:
 
 
 def test_designs_are_ranked_by_further_quantities(tmp_path: Path) -> None:
-    """Each as its own solve has it; of an articulated rod no pin force is told, and no weight is the least mass."""
+    """Compare with each solve; articulated rods have no pin force, and no weight is the least mass."""
     more = (
         'metric = "mean mount force"\nfurther = ["added mass", "maximum crank-pin force", "peak to peak stored work"]'
     )

@@ -265,7 +265,7 @@ def own_error(name: str) -> float:
 
 @pytest.mark.parametrize("name", CASES)
 def test_forces_of_the_joints_and_accelerations_of_the_bodies_agree(name: str) -> None:
-    """The simulation with itself: every load that reaches the block is counted, and none twice."""
+    """Check the simulation against itself: each load that reaches the block counts once."""
     for steps in (COARSE, FINE):
         loads = simulated(name, steps)
         assert error(name, loads.reactions, loads.momentum) < 1e-10
@@ -318,7 +318,7 @@ def in_bearings(case: Case, steps: int) -> NDArray[np.complex128]:
 
 @pytest.mark.parametrize("name", CASES)
 def test_bearing_forces_agree_within_the_error_of_the_simulation(name: str) -> None:
-    """Forces in the joints of crank and block, which `reactions` adds up, here one at a time."""
+    """Compare joint forces of crank and block one at a time."""
     case, coarse, fine = case_of(name), simulated(name, COARSE).bearings, simulated(name, FINE).bearings
     size = np.abs(fine).max()
     assert np.abs(in_bearings(case, FINE) - fine).max() < np.abs(coarse - fine[::2]).max() / 3.0 + ROUNDING * size

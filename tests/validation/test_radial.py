@@ -182,7 +182,7 @@ def test_loads_are_those_of_rigid_bodies(five: Problem) -> None:
 
 
 def test_forces_on_pins_and_walls_are_those_of_rigid_bodies(five: Problem) -> None:
-    """Knuckle pins, the crank pin under the master rod, and the walls, of masses and of gas (B11)."""
+    """Check knuckle pins, the crank pin under the master rod, and walls, for masses and gas (B11)."""
     star, engine = star_of(five.engine), five.engine
     point, turning = replace(five.points[0], gas=None), 1j * RADIUS * SPEED
     torque = crank_torque(engine, point)

@@ -52,7 +52,7 @@ def _pressure(diagram: object, x: float, grows: bool) -> float:
 
 
 def test_wrench_of_bodies_and_joints() -> None:
-    """To 1e-4 of the largest loads with steam, the rods as rigid bodies; the simulation's own error is far less."""
+    """Compare with rigid rods to 1e-4 of the largest loads, with steam."""
     problem = laufruhe.load(READY)
     gas, point = problem.points[0].gas, problem.points[0]
     assert isinstance(gas, Chambers)

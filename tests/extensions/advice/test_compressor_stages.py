@@ -28,7 +28,7 @@ def test_isothermal_stages_have_the_pressure_of_a_linear_equation() -> None:
 
 
 def test_every_link_is_balanced_at_its_pressure() -> None:
-    """Both links of three stages, with a first stage of two chambers, have no excess."""
+    """Check both links of three stages, of which the first has two chambers."""
     halves = [replace(STAGES[0], name=name, volume=2e-3) for name in ("head", "crank")]
     low, high = matched_pressures([*halves, *STAGES[1:]])
     moved = [replace(stage, delivery=low) for stage in halves]

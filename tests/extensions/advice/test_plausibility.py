@@ -40,7 +40,7 @@ def doubted(old: str = "", new: str = "") -> list[str]:
 
 
 def test_a_block_is_heavier_than_what_moves_in_it() -> None:
-    """Grams where kilograms are meant: no other number of such a block need be unusual."""
+    """Check a mass in grams instead of kilograms, the only unusual number of a block."""
     mounts = "[mounts]\nkind = 'elastic'\nstiffness = ['1 N/mm', '1 N/mm', '1 N/mm']\n" + "".join(
         f"[[mounts.places]]\nname = '{x}{y}'\nposition = ['{x} mm', '{y} mm', '0 mm']\n"
         for x in (-90, 90)
@@ -82,7 +82,7 @@ def test_an_open_mass_may_start_anywhere() -> None:
 
 @pytest.mark.parametrize("order_line", ["", "firing_order = [1, 10, 5, 7, 2, 8, 3, 9, 4, 6]", "fires_together = true"])
 def test_throws_without_a_firing_order_are_reported(order_line: str) -> None:
-    """A V10 whose throws leave every cylinder at its first dead centre: all fire in one turn of two."""
+    """Check a V10 whose cylinders would all fire in one turn of two."""
     vee = 'layout = "vee"\nbank_angle = 90\ncylinder_spacing = "98 mm"'
     engine = SINGLE.replace('layout = "inline"', vee).replace(
         "throws = [0]", f"throws = [45, 117, 333, 189, 261]\n{order_line}"

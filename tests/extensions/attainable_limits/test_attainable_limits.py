@@ -139,7 +139,7 @@ def test_no_design_of_a_grid_goes_under_what_a_limit_can_reach(name: str) -> Non
 
 @pytest.mark.slow
 def test_every_star_is_looked_at() -> None:
-    """Two couples of five cylinders: what one can reach under the other, by all stars there are."""
+    """Compare the attainable value of one couple of five cylinders under the other with all stars."""
     limits = [limit("rms rocking couple", orders=[k], max="300 N m", name=f"order {k}") for k in (1, 2)]
     problem = problem_of([*limits, limit("rms roll moment", max="9 MN m")], engine=FIVE, counterweights=None)
     result = laufruhe.solve(problem)
@@ -176,7 +176,7 @@ def mounts_of(front: dict[str, Any], rear: Any = OPEN) -> dict[str, Any]:
 @pytest.mark.slow
 @pytest.mark.parametrize("side", ["min", "max"])
 def test_limits_that_cannot_be_minimised_are_bisected(side: str) -> None:
-    """Natural frequencies under a sag, against a grid of both stiffnesses."""
+    """Compare natural frequencies under a limit on sag with a grid of both stiffnesses."""
     sides = {"min": "1 Hz", "max": "500 Hz"} | {side: "12 Hz"}
     limits = [limit("static sag", max="1 mm"), limit("natural frequencies", **sides)]
     problem = problem_of(
@@ -209,7 +209,7 @@ LOW = mounts_of({"position": ["200 mm", "250 mm", {"between": ["-50 mm", "50 mm"
 
 @pytest.mark.slow
 def test_the_nearest_design_is_kept_where_none_is_found() -> None:
-    """Travel on mounts whose place is open: nothing is proven, and nothing proven is claimed."""
+    """Check travel on mounts of open place, where no proof is claimed."""
     limits = [limit("maximum mount travel", max="1 mm"), limit("static sag", max="2 mm")]
     problem = problem_of(limits, block=BLOCK, counterweights=None, mounts=LOW, objective=FORCE,
                          search={"starts": 2, "boxes": 1})  # fmt: skip

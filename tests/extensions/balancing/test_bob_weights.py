@@ -44,7 +44,7 @@ def grams(pair: tuple[Engine, BobWeights]) -> list[float]:
 
 
 def test_ford_400() -> None:
-    """fordmuscle.com 2008, rotating assembly, page 2: the rotating part of a throw is printed as 1333 g."""
+    """Check the printed 1333 g of the rotating part of a throw (fordmuscle.com 2008, rotating assembly, page 2)."""
     weights = weights_of(V8, 'balance_factor = 0\nbig_end = "621.5 g"\nbearing_shells = "45 g"\n')
     assert grams(weights) == pytest.approx([1333.0] * 4)
     # with piston and pin, 639.5 g, and small end, 216 g: the ring set is not printed
@@ -54,7 +54,7 @@ def test_ford_400() -> None:
 
 
 def test_chevrolet_big_block() -> None:
-    """chevyhiperformance.com 0906: two big ends are printed as 459.6 g; the printed parts sum to 1505.2 g."""
+    """Check 459.6 g of two big ends and the sum of 1505.2 g (chevyhiperformance.com 0906)."""
     weights = weights_of(
         V8,
         'balance_factor = 0.5\nrings = "69.5 g"\npiston = "583.9 g"\npin = "173.6 g"\nlocks = "4.8 g"\noil = "4 g"\n'
@@ -65,7 +65,7 @@ def test_chevrolet_big_block() -> None:
 
 
 def test_lancia_fulvia() -> None:
-    """forum.viva-lancia.com, topic 8845: a weighing sheet of four cylinders, here at 50 % with one rod on a pin."""
+    """Check a weighing sheet of four cylinders at 50 % (forum.viva-lancia.com, topic 8845), one rod on a pin."""
     weights = weights_of(
         FOUR,
         'balance_factor = 0.5\nbig_end = ["490.5 g", "494.5 g", "495.5 g", "489.5 g"]\n'

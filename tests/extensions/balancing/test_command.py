@@ -123,7 +123,7 @@ def test_a_rotor_within_its_grade_needs_no_hole(folder: Path) -> None:
 
 
 def test_masses_of_one_pin_need_no_engine(folder: Path) -> None:
-    """Two rods on a pin: 2 x 0.3 kg in full, and 0.6 of 0.5 + 0.52 + 2 x 0.2 kg."""
+    """Check two rods on a pin: 2 x 0.3 kg in full, and 0.6 of 0.5 + 0.52 + 2 x 0.2 kg."""
     text = 'title = "Twin"\n[bob_weights]\nbalance_factor = 0.6\npiston = ["500 g", "520 g"]\nbig_end = "300 g"\n'
     (folder / "twin.toml").write_text(text + 'small_end = "200 g"\n', encoding="utf-8")
     result = run("twin.toml")

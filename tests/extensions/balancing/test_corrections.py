@@ -138,7 +138,7 @@ def cheek(direction: str, unbalance: str) -> Tables:
 
 
 def test_each_hole_keeps_its_wall_along_its_own_depth() -> None:
-    """A hole of 8 mm, 20 mm deep at 40 deg, is 3 mm from the pin and leaves 3.70 g cm of 42."""
+    """Check a hole of 8 mm, 20 mm deep at 40 deg: 3 mm from the pin, 3.70 of 42 g cm left."""
     plane = answer(cheek("radial", "42 g cm")).planes[0]
     assert len(plane.design) == 1
     assert 1e5 * abs(plane.residual) < 3.70
@@ -208,7 +208,7 @@ def test_without_time_there_is_a_design_but_no_proof(monkeypatch: pytest.MonkeyP
     [(0.5, 9.93, 1.26), (0.625, 15.52, 2.47), (0.75, 22.35, 4.26), (0.875, 30.42, 6.77), (1.0, 39.73, 10.10)],
 )
 def test_masses_of_holes(inches: float, grams: float, tip: float) -> None:
-    """Steel of 7.84 g/cm3 (EN24T, vintageajs.uk): 10 mm of a drill, and the tip of 118 deg, computed by hand."""
+    """Check 10 mm of a drill and its 118 deg tip in steel of 7.84 g/cm3 (EN24T, vintageajs.uk), by hand."""
     diameter = 25.4e-3 * inches
     flat, pointed = Drilling(STEEL), Drilling(STEEL, point_angle=math.radians(118.0))
     assert -1e3 * flat.mass(diameter, 0.01) == pytest.approx(grams, abs=0.006)

@@ -155,7 +155,7 @@ def test_each_reading_of_the_force_is_least_for_the_designs_that_it_decides(four
 
 
 def test_efficient_points_are_those_that_nothing_beats(four: xr.Dataset) -> None:
-    """Against the definition: no other point has as little force, mass and shafts, and less of one."""
+    """Compare with the definition: no other point is better in force, mass or shafts and no worse in all."""
     own = four.where(four["standing"] != MORE_CYLINDERS, drop=True)
     points = [
         (float(own["force"][b, k]), float(own["mass_limit"][k]), int(own["shafts"][b]), bool(own["efficient"][b, k]))
@@ -191,7 +191,7 @@ def test_worth_is_judged_against_fewer_shafts_and_the_next_engine(four: xr.Datas
 
 
 def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
-    """The study's -53 % beside the force pair; the printed mass, likely a misprint, says -14 %."""
+    """Check -53 % of the study; the printed mass, likely a misprint, gives -14 %."""
     data = _four("2.25 kg")
     better, falls = verdicts(data)["both"]
     assert better.agrees
@@ -205,7 +205,7 @@ def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
 
 @pytest.mark.parametrize(("mass", "fall"), [(1.25, 0.152), (2.25, 0.308)])
 def test_shaft_of_three_cylinders_by_mass(mass: float, fall: float) -> None:
-    """Barely over W2 with the printed mass, clearly with the other."""
+    """Check a value just above W2 with the printed mass, and far above with the other."""
     changes = {"engine.reciprocating_mass": f"{mass} kg", "gas.imep": "9 kp/cm^2"}
     problem = ProblemFiles(PROBLEMS).problem(Point(CaseTable(name="three", problem="tractor-three.toml", set=changes)))
     found = 1.0 - best(problem).force / best(with_shafts(problem, ())).force

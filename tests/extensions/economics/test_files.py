@@ -39,7 +39,7 @@ problem = "{PROBLEMS}/inline-five.toml"
 
 @pytest.mark.slow
 def test_economics_by_its_command(tmp_path: Path) -> None:
-    """Files, proofs, the worth of the shaft, and the engine with more cylinders rebuilt at equal power."""
+    """Check files, proofs, the worth of the shaft, and the larger engine rebuilt at equal power."""
     path, out = written(tmp_path, ECONOMICS, "study"), tmp_path / "out"
     answer = CliRunner().invoke(app, ["study", str(path), "--out", str(out), "--json", str(tmp_path / "s.json")])
     assert answer.exit_code == 0, answer.output

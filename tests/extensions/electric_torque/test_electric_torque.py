@@ -72,7 +72,7 @@ def is_proven(result: Result) -> bool:
 
 @pytest.mark.parametrize(("maximum", "reaches"), [(60.0, False), (900.0, True)])
 def test_one_order_takes_what_the_engine_makes_as_far_as_it_can(maximum: float, reaches: bool) -> None:
-    """The least rms of M + c in one order: c = -M, or c opposite M with the largest amplitude."""
+    """Check the least rms of M + c in one order: c = -M, or opposite M at the largest amplitude."""
     result = laufruhe.solve(problem_of([machine(max_torque=f"{maximum} N m")]))
     moment = shaking_loads(result.final.engine.unloaded, result.problem.points[0]).without_mean
     amplitude = complex(moment.at(2.0)[3])
@@ -89,7 +89,7 @@ def test_one_order_takes_what_the_engine_makes_as_far_as_it_can(maximum: float, 
 
 @pytest.mark.parametrize("seed", first_fast(list(range(50)), 2, 6))
 def test_no_torque_on_a_grid_beats_the_proven_one(seed: int) -> None:
-    """Amplitudes and angles of two orders on a grid, within the largest torque, evaluated anew."""
+    """Compare with a grid of amplitudes and angles of two orders within the largest torque."""
     rng = np.random.default_rng(seed)
     norm, channel = rng.choice(["rms", "maximum", "mean"]), rng.choice(["roll moment", "mount force"])
     throws, order = [([0, 180, 180, 0], [1, 3, 4, 2]), ([0, 240, 120], [1, 2, 3]), ([0, 0], [1, 2])][seed % 3]
@@ -117,7 +117,7 @@ def test_no_torque_on_a_grid_beats_the_proven_one(seed: int) -> None:
 
 
 def test_a_linear_program_finds_the_same_peak() -> None:
-    """Least peak of the roll moment under a largest torque, at 1440 angles, by HiGHS."""
+    """Compare the least peak of the roll moment with a linear program of HiGHS at 1440 angles."""
     problem = problem_of([machine(orders=[2, 4, 6], max_torque="90 N m")], "maximum roll moment")
     result = laufruhe.solve(problem)
     angles = problem.engine.cycle.angle * np.arange(1440) / 1440
@@ -148,7 +148,7 @@ def machine_torque(result: Result) -> Any:
 
 
 def test_copper_loss_and_current_limit_the_torque() -> None:
-    """R (T_rms / k)^2 with k = 0.5 N m/A and 0.05 ohm: 200 W allow 31.6 N m rms; the section says the same."""
+    """Check R (T_rms / k)^2, k = 0.5 N m/A and 0.05 ohm: 200 W allow 31.6 N m rms, as the section says."""
     keys = {"torque_constant": "0.5 N m/A", "resistance": "0.05 ohm", "max_loss": "200 W", "max_current": "400 A"}
     keys |= {"mean_torque": "-10 N m", "max_torque": "900 N m"}
     result = laufruhe.solve(problem_of([machine(**keys)]))
@@ -186,7 +186,7 @@ def test_a_machine_that_moves_nothing_measured_is_named(keys: dict[str, Any], mi
 def test_reactions_follow_from_work_and_from_the_moments_on_the_whole(
     shaft: str, stator: str, crank: float, block: float
 ) -> None:
-    """Torque on the crank from the work of the machine; on the mounts from the balance of moments of all bodies.
+    """Compare crank torque with the work of the machine, and mount loads with the balance of moments.
 
     A shaft of ratio -2 turns twice as fast and backwards: its machine on the ground pushes the whole engine forwards,
     against the reaction of its mounts, by its torque.
@@ -203,7 +203,7 @@ def test_reactions_follow_from_work_and_from_the_moments_on_the_whole(
 
 
 def test_at_an_uneven_speed_the_torque_turns_the_crank() -> None:
-    """A machine alone on a heavy crank: w^2 = w_0^2 + 2 T sin(h phi) / (J h), and the block takes T."""
+    """Check w^2 = w_0^2 + 2 T sin(h phi) / (J h) of a machine on a heavy crank, and T on the block."""
     given = machine(orders=[], harmonics=[{"order": 2, "torque": "50 N m"}])
     engine = {"reciprocating_mass": "1e-9 kg"}
     problem = problem_of([given], None, engine=engine, fidelity={"crank_inertia": "0.8 kg m^2"}, gas=None)
@@ -217,7 +217,7 @@ def test_at_an_uneven_speed_the_torque_turns_the_crank() -> None:
 
 
 def test_a_machine_twists_the_shaft_from_its_disc() -> None:
-    """Twist (T/J) / (w_n^2 - W^2) of two free discs, of which the machine drives the rear one."""
+    """Check (T/J) / (w_n^2 - W^2) of two free discs, the rear one driven."""
     torsion = {
         "throw_inertia": "0.05 kg m^2",
         "discs": [{"name": "rotor", "end": "rear", "inertia": "0.8 kg m^2", "shaft": {"stiffness": "3e4 N m/rad"}}],
@@ -234,7 +234,7 @@ def test_a_machine_twists_the_shaft_from_its_disc() -> None:
 
 
 def test_loads_depend_on_torques_as_the_table_says() -> None:
-    """Values midway between two designs: NONE and AFFINE hold for every load that this engine has."""
+    """Check NONE and AFFINE of the table midway between two designs, for every load of the engine."""
     torsion = {"throw_inertia": "0.05 kg m^2", "crank": {"stiffness": "1e6 N m/rad", "diameter": "60 mm"}}
     bearings = [{"x": f"{x} mm"} for x in (-200, 0, 200)]
     problem = problem_of(
@@ -360,7 +360,7 @@ def test_half_orders_belong_to_four_stroke_engines() -> None:
     ],
 )
 def test_a_mean_torque_that_nothing_balances_is_doubted(text: str, mean: str, words: str) -> None:
-    """A motor that drives a compressor gives what the gas takes; beyond a generator a brake takes the rest."""
+    """Check warnings about mean torques of machines on an engine and on a compressor."""
     machines = [{"name": "motor", "mean_torque": mean}]
     if text == "engine":
         problem = problem_of(machines)

@@ -255,7 +255,7 @@ def test_script_for_exudyn_agrees(name: str, tmp_path: Path, capsys: pytest.Capt
 
 @pytest.mark.slow
 def test_script_for_open_torsion_agrees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A branch at another speed, a ring that only damping holds, and losses of springs."""
+    """Compare a branch at another speed, a ring held by damping, and losses of springs."""
     path = tmp_path / "shaft.py"
     assert run(TWISTED, "opentorsion", path).exit_code == 0
     script = module_of(path)

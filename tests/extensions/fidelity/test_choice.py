@@ -40,7 +40,7 @@ print(found.objective.value, found.certificate.lower_bound, choose(found.problem
 
 @pytest.mark.slow
 def test_threads_of_the_machine_change_a_rounding() -> None:
-    """Optimum, bound and estimate to a rounding, whatever the threads of its libraries."""
+    """Check that threads change optimum, bound and estimate by a rounding only."""
     count = "3" if os.environ.get(NAMES[0]) == "1" else "1"
     answer = subprocess.run(
         [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True, cwd=ROOT,

@@ -93,7 +93,7 @@ def test_trade_of_a_damaged_file(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
-    """No load enters, so every fidelity is right, and the mounts alone are the cheapest."""
+    """Check that a trade without loads chooses the mounts alone, the cheapest fidelity."""
     path, out = PROBLEMS / "powertrain-torque-roll.toml", tmp_path / "trade.json"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(tmp_path / "trade"), "--json", str(out)])
     assert answer.exit_code == 0, answer.output
@@ -109,7 +109,7 @@ def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_trade_of_elastic_mounts(tmp_path: Path) -> None:
-    """Mounts held, unbalances open: rows of the block's own choices, and a regret where they can decide."""
+    """Check rows and regret of a trade with open unbalances on given elastic mounts."""
     path, out = written(tmp_path, _elastic_with_a_shaft()), tmp_path / "trade.json"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(tmp_path / "trade"), "--json", str(out)])
     assert answer.exit_code == 0, answer.output

@@ -108,7 +108,7 @@ def _keeps_its_word(problem: Problem, tolerance: float) -> None:
 
 @pytest.mark.slow
 def test_modes_and_motion_are_really_dropped() -> None:
-    """Meet all three cases: modes left out, no motion at all, modes that nothing excites."""
+    """Check dropped modes, dropped motion, and modes without excitation."""
     missing = {"modes", "motion"}
     for seed in range(6, AUTOMATIC):
         chosen = choose(random_elastic_problem(random.Random(700 + seed), gas=False), 3e-1).fidelity
@@ -122,7 +122,7 @@ def test_modes_and_motion_are_really_dropped() -> None:
 
 
 def test_a_question_about_modes_needs_no_loads() -> None:
-    """Remove what the choice leaves out: the optimum is the same number."""
+    """Check that the optimum without the dropped parts is the same number."""
     problem = load(PROBLEMS / "powertrain-torque-roll.toml")
     choice = needs(problem)
     left = " ".join(part.what for part in choice.left_out)

@@ -33,7 +33,7 @@ def _trade(*rows: TradeRow) -> Trade:
 
 
 def test_a_design_beyond_a_limit_is_no_decision() -> None:
-    """However much better it looks by the objective alone."""
+    """Check that a better objective does not excuse a broken limit."""
     quick, sound = _row("quick", 1e-3, -0.2, 0.12), _row("sound", 1.0, 1e-6, 2e-7)
     assert choices(_trade(quick, sound))[0] == sound
     assert choices(_trade(quick))[0] is None
@@ -43,7 +43,7 @@ def test_a_design_beyond_a_limit_is_no_decision() -> None:
 
 
 def test_advice_is_of_one_solve_and_of_many_designs() -> None:
-    """The fastest of each call, which may be different fidelities."""
+    """Check the fastest fidelity of each kind of call, which may differ."""
     one, many = _row("one", 1e-2, 1e-9, 0.0, 1.0), _row("many", 1.0, 1e-9, 0.0, 1e-2)
     assert choices(_trade(one, many)) == (one, many)
     assert advice(_trade(one, many)) == "`one` for one solve (10 ms); `many` for ten thousand designs (10 ms)."
@@ -53,7 +53,7 @@ def test_advice_is_of_one_solve_and_of_many_designs() -> None:
 
 @pytest.mark.parametrize(("first", "calls"), [(0.1, 4), (1.0, 2), (3.0, 1)])
 def test_a_call_is_repeated_unless_it_takes_seconds(first: float, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A first call fills caches, which a user's further calls have."""
+    """Check that a fast call is repeated, because the first one fills caches."""
     clock = [0.0]
     monkeypatch.setattr("laufruhe.extensions.fidelity.trade.time.process_time", lambda: clock[0])
     count = 0
@@ -74,7 +74,7 @@ def test_the_memory_of_a_call_is_its_largest_and_not_what_it_leaves() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_trade")
 def test_rows_are_what_separate_calls_return() -> None:
-    """Values exactly; times are compared by benchmarks."""
+    """Compare values with separate calls; benchmarks compare times."""
     problem = load(PROBLEMS / "tractor-single.toml")
     found = {row.name: row for row in trade(problem).rows}
     for name, fidelity in (("two-order, 720 steps", Fidelity("two-order", 720)), ("exact, 1440 steps", Fidelity())):
@@ -99,7 +99,7 @@ def test_an_open_flywheel_is_refused_before_anything_is_measured(tmp_path: Path)
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_trade")
 def test_problems_finished_in_time_have_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Measure two problems, of which one runs out of time: an error counts it."""
+    """Check that the finished one of two problems has a page, and that an error counts it."""
     quick, never = PROBLEMS / "boxer-four.toml", PROBLEMS / "inline-five.toml"
 
     def out_of_time(problem: Problem, *_: object) -> Trade:

@@ -58,7 +58,7 @@ def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: i
 
 @pytest.mark.parametrize("seed", first_fast((780017, 780003), 1))
 def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> None:
-    """Its bound is over the value of the unbalances told, and those are the best where the limits are kept."""
+    """Check that the bound of an infeasible corner is above the value of its unbalances."""
     problem, generator = joint(seed), np.random.default_rng(1)
     ((_, mounts),) = boxes_of(problem, generator, 1, 0.5)
     given = MountedLoads(problem).at(mounts)
@@ -151,7 +151,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
 
 
 def test_a_spent_budget_computes_no_more_corners(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Halves of a box are then bounded by the corners that are known."""
+    """Check that known corners bound the halves of a box after the budget is spent."""
     problem = joint(780003)
     boxes = DesignBoxes(problem, math.inf, lambda *_: math.inf)
     ((lower, upper),) = boxes_of(problem, np.random.default_rng(2), 1, 0.02)

@@ -120,7 +120,7 @@ def test_a_share_of_the_boxes_is_divided_first() -> None:
 
 
 def test_a_ratio_beside_a_force_keeps_all_orders(tmp_path: Path) -> None:
-    """Orders that add nothing to a limited force may be most of a transmissibility; of a force alone they are left."""
+    """Check that transmissibility keeps orders that a limited force drops."""
     limit = '[[constraints]]\nlimit = "rms mount force"\nmax = "1e9 N"\n'
     left_out = []
     for minimised in ("transmissibility", "rms mount force"):

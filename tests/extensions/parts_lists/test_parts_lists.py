@@ -126,7 +126,7 @@ def test_price_is_a_limit_or_a_term(read: Callable[..., Problem]) -> None:
 
 
 def test_a_row_over_the_price_limit_is_not_solved(read: Callable[..., Problem]) -> None:
-    """The limit of the file, and one that the rows set: three rows at 9, 6 and 4 under 7, 5 and 4."""
+    """Check limits of the file and of rows: three rows at 9, 6 and 4 under 7, 5 and 4."""
     limit = '[parts_price]\ntotal = 5\n[[constraints]]\nname = "cost"\nlimit = "parts price"\nmax = 7\n'
     of_rows = "name, mass [kg], price, most\nsmall, 0.5, 9, 7\nmiddle, 1.5, 6, 5\nlarge, 3.0, 4, 4\n"
     sets = CHOICE + 'sets = { most = "constraints.cost.max" }\n'

@@ -23,7 +23,7 @@ def test_no_figure_of_the_tractor_study_has_a_fault(name: str, figure: Callable[
 
 @pytest.mark.slow
 def test_crowded_bars_stand_in_rows(figure: Callable[[str], xr.Dataset]) -> None:
-    """Six series for five places: 30 bars in a row leave no room for their numbers."""
+    """Check that six series of five groups, 30 bars too narrow for numbers, stand in rows."""
     picture = parts_of("tractor-study")["fig-25"].picture(figure("fig-25"))
     assert len(picture.panels) == 4
     for first, second in zip(picture.panels[::2], picture.panels[1::2], strict=True):

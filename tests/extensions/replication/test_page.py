@@ -35,7 +35,7 @@ def test_every_figure_and_statement_is_on_the_page(
     monkeypatch: pytest.MonkeyPatch,
     finished: Callable[..., None],
 ) -> None:
-    """A picture and a dataset a figure, and the list of statements."""
+    """Check a picture and a dataset for each figure, and the list of statements."""
     monkeypatch.chdir(tmp_path)
     file = study_with(names, tmp_path)
     finished("tractor-study", tmp_path / "results" / "tractor-study", names)

@@ -169,7 +169,7 @@ def _data(part: Replication) -> xr.Dataset:
 
 
 def test_cases_sweep_and_keep_their_own_dimensions() -> None:
-    """Two swept numbers, one case without any, and mounts that the other engine does not have."""
+    """Check two swept numbers, a case without any, and mounts that one engine lacks."""
     sweep = {"cm": {"values": [6, 9]}, "kappa": {"from": 0, "to": 1, "points": 3}}
     part = _part(cases=[
         {"name": "swept", "problem": "web", "sweep": sweep},
@@ -203,7 +203,7 @@ def test_cases_may_sweep_in_any_order() -> None:
 
 
 def test_readings_change_numbers_and_repeat_panels() -> None:
-    """A case's own numbers stand; what holds for both readings is drawn once."""
+    """Check that a case's own numbers stay, and that common panels are drawn once."""
     panels = [{"title": "a", "curves": [{"x": "[0, 1]", "y": "[0, mean['given']]"}]}, {"title": "b", "once": True}]
     readings = {"slow": {"cm": 6}, "fast": {"cm": 9}}
     cases = [{"name": "given", "problem": "web"}, {"name": "own", "problem": "web", "numbers": {"cm": 9}}]

@@ -95,7 +95,7 @@ JUDGED = [name for name in FIGURES if any(name in ours for ours in OURS.values()
 
 @pytest.mark.parametrize("name", JUDGED)
 def test_statements(figure: Data, name: str) -> None:
-    """In every reading of the reciprocating mass."""
+    """Check all statements in every reading of the reciprocating mass."""
     data = figure(name)
     assert data["by_reading"].values.tolist() == [reading for reading, ours in OURS.items() if name in ours]
     for reading in data["by_reading"].values.tolist():
@@ -134,7 +134,7 @@ class TestSingle:
     """Figs. 2 to 10."""
 
     def test_gas_loads_both_mounts_alike_and_opposed(self, worth: Worth) -> None:
-        """Eq. 1: a moment and no force."""
+        """Check eq. 1: a moment and no force."""
         force = worth("fig-02-05-07", "at(force['gas'], direction='vertical')")
         np.testing.assert_allclose(
             force.sel(mount="left"), -force.sel(mount="right"), atol=1e-9 * float(abs(force).max())
@@ -155,11 +155,11 @@ class TestSingle:
         assert worth("fig-02-05-07", "mass") == pytest.approx(1.13 * 300.0, rel=0.02)
 
     def test_rod_inertia_of_fig_7(self, worth: Worth) -> None:
-        """About dTheta lambda w^2 / b, to a few percent: cos psi in the denominator is what that leaves out."""
+        """Check dTheta lambda w^2 / b to a few percent, the effect of cos psi in the denominator."""
         assert worth("fig-02-05-07", "rod / (abs(deficit) * lam * w**2 / b / kp)") == pytest.approx(1.0, rel=0.08)
 
     def test_polar_diagrams(self, worth: Worth) -> None:
-        """Figs. 8, 9: unbalanced all vertical, wholly balanced more across than up."""
+        """Check figs. 8, 9: vertical without balance, more across than up with full balance."""
         across = worth("fig-08-09", "lateral").values
         assert across[0] == 0.0
         assert across[0] < across[1] < 1.0 < across[2]
@@ -210,7 +210,7 @@ class TestSeveralCylinders:
             assert 0.97 <= ratio <= 1.0 + 1e-4
 
     def test_equal_power(self, worth: Worth) -> None:
-        """Fig. 13: three beat four, and two by more; eq. 23 holds for engines built anew."""
+        """Check fig. 13: three beat four, and two by more; eq. 23 holds for rebuilt engines."""
         two, three, four, _ = worth("fig-13", "built")
         assert three < 0.7 * four < 0.7 * two
         np.testing.assert_allclose(worth("fig-13", "built"), worth("fig-13", "converted"), rtol=1e-9)
@@ -221,7 +221,7 @@ class TestSeveralCylinders:
     def test_first_order_shafts(
         self, worth: Worth, name: str, throws: str, root: float, low: float, high: float
     ) -> None:
-        """'vernachlaessigbar', and 'merklich, wenn auch nicht sehr gross'. 7 % is a millimetre of a printed bar."""
+        """Check 'vernachlaessigbar', and 'merklich, wenn auch nicht sehr gross' (7 % is 1 mm of a printed bar)."""
         assert worth(name, f"abs(couple_star({throws}))") == pytest.approx(root)
         assert low < -worth(name, "change") < high
         assert low < -worth(name, "best") < high
@@ -238,13 +238,13 @@ class TestFourCylinder:
         assert worth("fig-22", "share") == pytest.approx(0.275, abs=0.05)
 
     def test_2_25_kg_meet_fig_22(self, worth: Worth) -> None:
-        """-70 % and -53 % printed, five points each for what is not printed; about Φ = 50 % the curve is flat."""
+        """Check printed -70 % and -53 % within five points; about 50 % of Φ the curve is flat."""
         assert worth("fig-22", "1 - mean['force'] / mean['none']", reading=MEANT) == pytest.approx(0.70, abs=0.05)
         assert worth("fig-22", "1 - mean['both'] / mean['force']", reading=MEANT) == pytest.approx(0.53, abs=0.05)
         assert worth("fig-22", "at(part_load, phi=0.5) / min(part_load)", reading=MEANT) < 1.06
 
     def test_torques_cancel_where_the_roll_moment_is_least(self, worth: Worth) -> None:
-        """The speed by three amplitudes at 10 m/s, against the exact model at that speed."""
+        """Compare the speed from three amplitudes at 10 m/s with the exact model."""
         problem = load(PROBLEMS / "tractor-four-lanchester.toml")
         cranks = tuple(replace(part, reciprocating_mass=2.25) for part in problem.engine.slider_cranks)
         engine = replace(problem.engine, slider_cranks=cranks, rotors=())
@@ -271,7 +271,7 @@ class TestFourCylinder:
 
 
 def test_two_stroke_four(worth: Worth) -> None:
-    """Fig. 28: which crank is best, what is left of it, and eqs. 30 and 31 against the proven optimum: 0.1 %."""
+    """Check fig. 28: the best crank, its rest, and eqs. 30 and 31 within 0.1 % of the proven optimum."""
     for figure in ("Fig. 26", "Fig. 27"):
         ratio = worth("fig-28", f"mean['{figure}, shaft'] / mean['{figure}, best']")
         assert ratio == pytest.approx(1.0, rel=1e-3)
@@ -279,7 +279,7 @@ def test_two_stroke_four(worth: Worth) -> None:
 
 
 def test_vee_by_angle(worth: Worth) -> None:
-    """Fig. 29: |cos alpha|, 1; and for the second order |cos alpha/2|, |cos 3 alpha/2|, each times its amplitude."""
+    """Check fig. 29: |cos alpha| and 1; |cos alpha/2| and |cos 3 alpha/2| times amplitude for order 2."""
     force = worth("fig-29", "force")
     alpha = np.radians(force["bank"].values)
     np.testing.assert_allclose(force.sel(order=1, turns="with the crank"), 1.0, atol=1e-12)
@@ -293,7 +293,7 @@ def test_vee_by_angle(worth: Worth) -> None:
 
 
 def test_boxer_against_inline(worth: Worth) -> None:
-    """Fig. 30: force in line, couple opposed, nothing of first order; four forces, two arms of one stagger."""
+    """Check fig. 30: force in line, couple opposed, no order 1; four forces, two arms of one stagger."""
     assert max(worth("fig-30", f"at(force['{name}'], order=1)") for name in ("inline", "boxer")) == 0.0
     assert max(worth("fig-30", f"at(couple['{name}'], order=1)") for name in ("inline", "boxer")) < 1e-9
     assert worth("fig-30", "max(force['boxer'])") == 0.0
@@ -302,12 +302,12 @@ def test_boxer_against_inline(worth: Worth) -> None:
 
 
 def test_isolation_from_root_two(worth: Worth) -> None:
-    """Fig. 31: whatever the damping."""
+    """Check fig. 31 for any damping."""
     np.testing.assert_allclose(worth("fig-31", "at_root_two"), 1.0, rtol=1e-12)
 
 
 def test_free_force(worth: Worth) -> None:
-    """4 m r w^2 (lambda + lambda^3/4): "about 1000 kp" with 2.25 kg, little over half of it with 1.25 kg."""
+    """Check 4 m r w^2 (lambda + lambda^3/4): "about 1000 kp" with 2.25 kg, little over half with 1.25 kg."""
     for reading, force in ((PRINTED, 555.0), (MEANT, 998.0)):
         result = worth("free-force", "force", reading=reading)
         closed = worth("free-force", "4 * piston * (lam + lam**3 / 4) / kp", reading=reading)
@@ -338,7 +338,7 @@ def test_one_trace_meets_all_five_with_2_25_kg(worth: Worth) -> None:
 
 
 def test_bars_carry_their_numbers(figure: Data) -> None:
-    """Four series of five groups: the mean inside, the largest above."""
+    """Check four series of five groups: the mean inside, the largest above."""
     words = [text.get_text() for text in draw(Replication.picture(figure("fig-13"))).axes[0].texts]
     assert "59.3" in words
     assert figure("fig-13")["verdict"].values.tolist() == [[CONFIRMED] * 2] * 3

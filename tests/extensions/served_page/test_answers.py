@@ -250,7 +250,7 @@ def test_pictures_of_other_files_are_not_shown() -> None:
 
 @pytest.mark.slow
 def test_a_number_of_the_file_is_held_where_it_stands_until_it_is_searched() -> None:
-    """Sliders move the weights on the engine that its start draws; what is found last has no bound to claim."""
+    """Check that sliders act on the drawn engine, and that its optimum claims no bound."""
     path = PROBLEMS / "single-stroke-offset.toml"
     first, held = follow(path), follow(path, edits=(Edit("fix", "engine.stroke", "130 mm"),))
     assert [slider["name"] for slider in first["model"]["sliders"]] == ["web.balance_factor"]

@@ -79,7 +79,7 @@ def test_a_ranked_crank_is_proven() -> None:
 
 @pytest.mark.slow
 def test_places_and_a_crank_are_decided_together_before_anything_is_proven() -> None:
-    """Far under what any estimate of given places, or of a given crank, has."""
+    """Check a value far below any estimate with a given place or crank."""
     result = settle(INPUTS / "rank-all-cranks.toml", OPEN_CRANK)
     assert result["claim"]["value"] == pytest.approx(458.65, abs=0.02)
     assert result["claim"]["kind"] in ("proven", "found")

@@ -82,7 +82,7 @@ def test_nothing_beyond_the_folder_is_read(name: str, tmp_path: Path) -> None:
     ],
 )
 def test_every_file_that_a_problem_names_is_watched(name: str, beside: str, tmp_path: Path) -> None:
-    """A pressure trace, a fuel test, a dynamic stiffness and a list of parts."""
+    """Check a pressure trace, a fuel test, a dynamic stiffness and a list of parts."""
     folder = INPUTS if name == "rank-all-cranks" else PROBLEMS
     for path in folder.glob("*.csv"):
         shutil.copy(path, tmp_path)

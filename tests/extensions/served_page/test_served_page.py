@@ -359,7 +359,7 @@ def test_claims_of_earlier_settings_are_marked_in_the_moment_a_slider_moves(
 
 
 def test_no_claim_is_shown_for_settings_that_it_is_not_about(shown: Page) -> None:
-    """While a slider moves as a hand moves it: faster than answers come."""
+    """Check claims while a slider moves faster than answers come."""
     shown.evaluate(CLAIMS)
     for k in range(12):
         slide(shown, "engine.rod_ratio", 0.2 + 0.01 * k)

@@ -85,7 +85,7 @@ def test_torque_is_the_plain_sum_over_cylinders_and_cycles(seed: int) -> None:
 @pytest.mark.parametrize("name", first_fast(["inline-four-misfire", "vee-eight-cross", "two-stroke-three",
                                              "opposed-pistons-lead", "car-four-willans"], 0))  # fmt: skip
 def test_all_firings_are_the_engine(name: str) -> None:
-    """Over one cycle and over three, in every measure that the torque reaches."""
+    """Compare a pattern of all firings over one and three cycles with the engine, in every measure."""
     for cycles in (1, 3):
         model = model_of(PROBLEMS / f"{name}.toml", cycles)
         measures = [ROLL, WORK, SPEED] + [FORCE, PEAK] * bool(model.problem.engine.mounts)
@@ -123,7 +123,7 @@ def test_spectrum_is_that_of_the_pattern_times_one_pulse() -> None:
 
 
 def test_speed_of_a_heavy_flywheel_follows_the_stored_work() -> None:
-    """Over three cycles: T3 tends to the stored work over J w^2 (textbook eq. 25)."""
+    """Check over three cycles that T3 tends to stored work over J w^2 (textbook eq. 25)."""
     model = model_of(MISFIRE, 3, inertia=1e4)
     design = model.evaluation("110")
     stored = design.value(WORK) / (1e4 * model.point.speed**2)

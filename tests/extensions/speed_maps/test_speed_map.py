@@ -159,7 +159,7 @@ def test_bad_maps_are_one_line(tmp_path: Path, speeds: str, more: str, said: str
 
 
 def test_map_by_its_command(tmp_path: Path) -> None:
-    """Two cases of different measures: what one lacks is empty, and files are whole."""
+    """Check two cases of different measures: missing values are empty, and files are whole."""
     text = part(str(elastic(tmp_path)), 'from = "600 rpm", to = "900 rpm", points = 3', "by_order = true")
     text += CASE.format(name="two", problem=PROBLEMS / "tractor-three-shafts.toml")
     out = tmp_path / "out"

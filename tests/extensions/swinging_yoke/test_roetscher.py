@@ -19,7 +19,7 @@ def shaper() -> SwingingYoke:
 
 
 def test_speeds_of_the_swinging_yoke() -> None:
-    """Eq. 304, c_1 = v R / (e + r) at the top of the crank circle; eq. 305, c_2 = v R / (e - r) at its lowest point."""
+    """Check eqs. 304, 305: c_1 = v R / (e + r) at the top of the crank circle, c_2 = v R / (e - r) below."""
     yoke, v = shaper(), 1.0
     r, e, length = yoke.crank_radius, yoke.pivot, yoke.lever_length
     forward, back = (-v / r * yoke.velocity(np, np.array([angle]))[0] for angle in (0.5 * math.pi, 1.5 * math.pi))
@@ -33,7 +33,7 @@ def test_speeds_of_the_swinging_yoke() -> None:
 
 @pytest.mark.parametrize("degrees", [10.0, 80.0, 130.0, 200.0, 275.0, 340.0])
 def test_speed_by_the_construction_of_the_figure(degrees: float) -> None:
-    """Fig. 1071: c = v GD FC / (r CD), F the foot of the perpendicular from M on the lever."""
+    """Check fig. 1071: c = v GD FC / (r CD), F the foot of the perpendicular from M on the lever."""
     yoke, phi = shaper(), math.radians(degrees)
     pin, pivot = yoke.crank_radius * complex(math.cos(phi), math.sin(phi)), -1j * yoke.pivot
     along = (pin - pivot) / abs(pin - pivot)
@@ -45,7 +45,7 @@ def test_speed_by_the_construction_of_the_figure(degrees: float) -> None:
 
 
 def test_times_of_both_strokes() -> None:
-    """Text below Fig. 1071: v_a / v_r = beta / alpha, angles between the perpendiculars from M on both ends."""
+    """Check v_a / v_r = beta / alpha below fig. 1071, angles between perpendiculars from M on both ends."""
     yoke = shaper()
     top, bottom = yoke.dead_centres
     slow = bottom - top

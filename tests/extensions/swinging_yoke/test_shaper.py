@@ -53,7 +53,7 @@ def columns(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_weights_are_those_of_least_squares(solved: Result) -> None:
-    """To 1e-6; a weight beside the line of the lever would be nothing at its optimum."""
+    """Compare weights to 1e-6; a weight beside the line of the lever would be zero."""
     assert solved.certificate.kind == "global"
     given, units = columns(solved.problem)
     best, *_ = np.linalg.lstsq(units, -given, rcond=None)
@@ -71,7 +71,7 @@ def test_weights_are_those_of_least_squares(solved: Result) -> None:
 
 
 def test_quicker_return_shakes_more(solved: Result) -> None:
-    """The same ram and weights open, a return twice as quick."""
+    """Check the optimum of a return twice as quick, with the same ram and open weights."""
     quicker = laufruhe.solve(solved.problem.with_values({"engine.return_ratio": 2.2}))
     assert quicker.certificate.kind == "global"
     assert quicker.objective.value > solved.objective.value
@@ -93,7 +93,7 @@ def test_lever_weight_at_an_uneven_speed_has_no_bound() -> None:
 
 @pytest.mark.parametrize("maximum", [120.0, 60.0])
 def test_the_weight_of_the_lever_counts_as_a_counterweight(maximum: float) -> None:
-    """Both weights together under a limit, against a scan of how they share it by least squares of positions."""
+    """Compare both weights under a limit with a scan of their shares by least squares."""
     text = PROBLEM.read_text(encoding="utf-8").replace("unbalance = {", 'radius = "400 mm"\nunbalance = {')
     limit = f'[[constraints]]\nlimit = "counterweight mass"\nmax = "{maximum} kg"\n'
     problem = laufruhe.load(text + limit)
