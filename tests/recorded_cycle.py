@@ -11,7 +11,7 @@ DEGREES = np.arange(-360.0, 360.0)
 
 
 def cycle_pressure(degrees: ArrayLike) -> NDArray[np.float64]:
-    """Compression, a burn from -8 deg, expansion, blow-down and gas exchange at 1 bar, from firing on [bar]."""
+    """Return the pressure of compression, burn from -8 deg, expansion, blow-down, gas exchange at 1 bar [bar]."""
     angle = np.radians((np.asarray(degrees, dtype=float) + 360.0) % 720.0 - 360.0)
     ratio = CRANK / ROD
     travel = (1.0 + 1.0 / ratio - np.cos(angle) - np.sqrt(1.0 / ratio**2 - np.sin(angle) ** 2)) / 2.0
@@ -23,12 +23,12 @@ def cycle_pressure(degrees: ArrayLike) -> NDArray[np.float64]:
 
 
 def lever(degrees: ArrayLike, crank: float = CRANK, rod: float = ROD) -> NDArray[np.float64]:
-    """Torque over the gas force [m]."""
+    """Return the torque over the gas force [m]."""
     angle, ratio = np.radians(np.asarray(degrees, dtype=float)), crank / rod
     return crank * np.sin(angle) * (1.0 + ratio * np.cos(angle) / np.sqrt(1.0 - (ratio * np.sin(angle)) ** 2))
 
 
 def mean_torque() -> float:
-    """Mean torque of one cylinder over 1 bar on its underside [N m]."""
+    """Return the mean torque of one cylinder over 1 bar on its underside [N m]."""
     angles = np.arange(0.0, 720.0, 0.01)
     return float(np.mean((cycle_pressure(angles) - 1.0) * 1e5 * AREA * lever(angles)))

@@ -195,7 +195,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
         verdict.wrong.append(f"value {value:.9g} is worse than {initial_scene.objective:.9g} as given")
     if rival is None or rival.violation > 1e-6:
         return
-    # what a rival passes a limit by is worth the limit's price
+    # the excess of a rival over a limit costs the limit's price
     prices = (abs(float(np.nan_to_num(limit.shadow_price)) * limit.limit) for limit in result.limits)
     passed = (max(rival.violation, 0.0) + _read_low(result, scene)) * sum(prices)
     if bound > rival.value * (1.0 + reading) + floor + passed:

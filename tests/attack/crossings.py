@@ -339,7 +339,7 @@ def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
         rival = convex_rival(stage, vector, {}, rank.minimum * (1.0 - 2e-5), STEEP_CHARGE)
         verdict.rivals += rival.looked_at
         if rival.violation <= EXCESS:
-            # what a rival passes a limit by is charged: near the best of a rank before, any share is worth much
+            # the excess over a limit costs: near the best of an earlier rank any share has a price
             best = rival.value * (1.0 + STEEP_CHARGE * max(rival.violation, 0.0))
             if rank.lower_bound > best * (1.0 + reading) + floor:
                 verdict.wrong.append(f"{rank.name}: bound {rank.lower_bound:.9g}, a rival has {best:.9g}")

@@ -448,7 +448,7 @@ def uneven_crankcase(rng: Generator) -> Table:
     while wide < 3.0:
         table = crankcase(rng)
         angles, turns = table["engine"]["throws"], 2 if table["engine"]["cycle"] == "four-stroke" else 1
-        # those that move keep away from where another fires, and from a dead centre of their own
+        # moving throws keep away from other firings, and from their own dead centres
         at = np.sort(np.mod(-np.array(angles), 360.0))
         gaps = np.diff([*at, at[0] + 360.0])
         wide = 0.4 * float(gaps.min()) if len(angles) > 1 else 0.0
@@ -818,7 +818,7 @@ def rotary(rng: Generator) -> Table:
     chosen = [kinds[k] for k in sorted(rng.choice(len(kinds), 2, replace=False))]
     table["constraints"] = [{"limit": name, "max": maximum, "name": name} for name, maximum in chosen]
     if rng.random() < 0.25:
-        # what is left of force and couple, by as little mass as may be
+        # remaining force and couple, by the least mass
         table["objective"] = {"minimise": "counterweight mass"}
         whole = size * number(table["operating_points"][0]["speed"]) ** 2
         part = rng.uniform(0.05, 0.6)
@@ -883,7 +883,7 @@ def sizes(rng: Generator) -> Table:
     else:
         kinds = ("shaking force", "mount force", "main-bearing force", "crank-pin force")
         table = with_objective(rng, table, channels=kinds, norms=SMOOTH)
-        # what turns with the throws is in no second order, and not on the pins
+        # masses that turn with the throws have no second order, and do not load the pins
         for term in table["objective"].get("terms", [table["objective"]]):
             key = "quantity" if "quantity" in term else "minimise"
             term[key] = term[key].replace("crank-pin force", "main-bearing force")
@@ -989,7 +989,7 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
             ask = random_term(rng, table)
             low, high = best.measure(ask), initial.measure(ask)
             maximum = low * rng.uniform(0.8, 0.98) if rng.random() < 0.5 else low + (high - low) * rng.uniform(0.1, 0.6)
-        # what vanishes by itself is no limit
+        # a load that vanishes by itself is no limit
         if maximum > 1e-4 * high > 1e-7:
             narrowed = {key: value for key, value in ask.items() if key != "quantity"}
             quantity = ask["quantity"]

@@ -193,7 +193,7 @@ class Search:
 
 def reading(quantities: list[str], table: Table) -> float:
     """Return the relative accuracy of these quantities in the own model."""
-    # of gas it has more orders than the package, whose last ones count in a transmissibility
+    # its gas has more orders than the package, of which the last count in a transmissibility
     with_gas = [1e-7] if "gas" in table and "transmissibility" in quantities else []
     return max([EXACT, *with_gas, *(SAMPLED[key] for key in SAMPLED for q in quantities if q.startswith(key))])
 

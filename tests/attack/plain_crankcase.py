@@ -149,7 +149,7 @@ def on_shaft(scene: Any, machine: Machine, pins: Any, speed: float) -> list[tupl
     """Return the loads on the crankshaft, each with its place."""
     turned = np.exp(1j * angles(machine.turns))
     loads = [(m.x, pin) for m, pin in zip(machine.mechanisms, pins, strict=True)]
-    # what turns with a throw beside its rod
+    # masses that turn with a throw beside its rod
     loads += [(m.x, m.pin_mass * speed**2 * rod_end(m, angles(machine.turns))) for m in machine.mechanisms]
     return loads + [
         (x, unbalance * speed**2 * turned) for _, x, _, _, unbalance, _, role in scene.rotors if role == "c"

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 
 # more of them resolve the bends of gas torque better
 SAMPLES = int(os.environ.get("ATTACK_SAMPLES", "4096"))
-# of crank speed; what lies above is under rounding
+# highest order of crank speed; higher ones are below rounding
 LAST_ORDER = 60
 PASCAL = {"Pa": 1.0, "bar": 1e5}
 
@@ -528,7 +528,7 @@ def _parts(e: dict[str, Any]) -> list[Mechanism]:
         shaft = shafts.get(part.get("shaft", ""), {})
         y, z = (number(v) for v in shaft.get("position", [0.0, 0.0]))
         ratio, bank = float(shaft.get("ratio", 1)), math.radians(part.get("bank_angle", 0.0))
-        # what a shaft carries is as far ahead as it leads
+        # masses of a shaft are ahead by its lead
         throw = math.radians(part.get("throw", 0.0) + ratio * shaft.get("lead", 0.0))
         parts.append(
             Mechanism(

@@ -17,7 +17,7 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.mounts.convex import is_convex
 from problem_files import ELASTIC
 
-# of an open star; all of them are looked at by the ready problem itself
+# number of starts of an open star; the ready problem itself takes all of them
 STARS = 12
 
 

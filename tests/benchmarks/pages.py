@@ -14,7 +14,7 @@ from typing import NoReturn
 import psutil
 
 ROOT = Path(__file__).resolve().parents[2]
-# what tests share is shared with benchmarks
+# benchmarks share the modules of tests
 sys.path.insert(0, str(ROOT / "tests"))
 # The rest of results/ is what the commands write, and not committed.
 PAGES = ROOT / "results" / "benchmarks"
@@ -40,7 +40,7 @@ def processor_seconds() -> float:
 def _busy_seconds() -> float:
     """Return the busy time of all processors since the start of the machine [s]."""
     times = psutil.cpu_times()._asdict()
-    # what guests had is counted as user time too
+    # user time includes the time of guests
     return float(sum(times.values()) - sum(times.get(name, 0.0) for name in ("idle", "iowait", "guest", "guest_nice")))
 
 

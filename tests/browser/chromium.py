@@ -93,7 +93,7 @@ def violations(page: Page) -> list[dict[str, object]]:
     """Return the violations that axe finds on the page."""
     if not page.evaluate("() => 'axe' in window"):
         page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
-    # of what is well one example will do
+    # one example of a passed rule is enough
     script = "() => axe.run({ resultTypes: ['violations'] }).then(found => found.violations)"
     return page.evaluate(script)  # type: ignore[no-any-return]
 

@@ -12,7 +12,7 @@ from browser.chromium import Watched, serious
 
 pytestmark = pytest.mark.slow
 
-# of paper inside its margins of 15 mm [CSS pixels]: A4 upright, and lying for wide tables
+# width of A4 paper inside margins of 15 mm [CSS pixels]: upright, and lying for wide tables
 UPRIGHT, LYING = 680, 1009
 BEYOND = f"""() => [...document.querySelectorAll("main *")].flatMap(element => {{
     const edge = element.closest(".wide") ? {LYING} : {UPRIGHT};

@@ -18,7 +18,7 @@ VALUES = {"value", "cutoff", "known", "best", "level", "maximum"}
 BOUNDS = ("bound", "divide", "floor", "found", "minimum", "looked", "total")
 """What names of bounds have in them."""
 ALLOWED = {
-    # what is shown of designs under a level is so of all up to it, and parts that are cut off are not under theirs
+    # bounds of all designs up to a level hold below it, and cut-off parts are not below theirs
     "min(looked[0], first.level)",
     "min(best, self.level)",
     "min(self._minimum, child.level)",
@@ -26,9 +26,9 @@ ALLOWED = {
     # the least of the bounds of several stars
     "min(incumbent, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))",
     "min(incumbent, float(bounds.min(initial=math.inf)))",
-    # of an objective in ranks the least value that is known, when a walk finds a better one
+    # least known value of an objective in ranks, when a walk finds a better design
     "min(rank.minimum, value)",
-    # what springs do at most, and how much is worth looking at
+    # largest forces of springs, and the worth of further search
     "min(maximum, line.largest)",
     "min(firing.maximum, firing.cycle.angle - (len(constants) - 1) * firing.minimum)",
     "min(maximum, bounds[name].work(value / term.weight))",

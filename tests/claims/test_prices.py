@@ -204,7 +204,7 @@ def _agrees(price: Price, here: float, moved: list[dict[str, Any]], step: float,
     """Check that slopes of short steps lie on both sides of the price of every edge but an angle."""
     relaxed, tightened = (laufruhe.solve(other).objective.value for other in moved)
     falls, rises = (here - relaxed) / step, (tightened - here) / step
-    # what a short step bends, and what the proofs leave open
+    # error of a short step, and the gap of the proofs
     slack = 0.15 * max(abs(rises), abs(falls)) + 2.0 * left / step + 1e-3 * here * 1e-2 / step
     assert falls - slack <= price.relaxed <= price.tightened + 1e-12 <= rises + slack + 1e-12
     assert price.relaxed <= falls + slack + 0.5 * abs(rises - falls)

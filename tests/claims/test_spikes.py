@@ -75,7 +75,7 @@ def test_no_bound_lies_over_a_design(seed: int, norm: str, tmp_path: Path) -> No
     result = laufruhe.solve(scene(pressure, norm, tmp_path))
     worth = of_design(result, pressure, norm)
     assert result.certificate.lower_bound <= worth * (1.0 + 1e-9)
-    # what is called proven to the tolerance is read to the tolerance
+    # a value proven to the tolerance is read to the tolerance
     assert result.certificate.kind is not Proof.GLOBAL or worth == pytest.approx(result.objective.value, rel=2e-4)
     # and neither is a bound that nobody needs
     assert result.certificate.lower_bound > 0.5 * worth

@@ -115,7 +115,7 @@ def test_unknown_is_neither_constant_nor_affine(resultant: LoadChannel, monkeypa
     for kind in KINDS.values():
         assert dependence.dependence(resultant, kind, problem) is Dependence.UNKNOWN
         assert depends(resultant, {kind}, problem)
-    # of the same name, and not the channel that the table is of
+    # channel of the same name that is not the one of the table
     monkeypatch.setitem(_KNOWN, MOUNT_FORCE.name, MOUNT_FORCE)
     other = replace(MOUNT_FORCE, signal=_resultant)
     assert dependence.dependence(other, Kind.FLYWHEEL, problem) is Dependence.UNKNOWN

@@ -21,7 +21,7 @@ PATIENT = "import laufruhe.cli.supervised as own; own.PATIENCE = {}\n"
 STANDS = "import laufruhe.solvers as s; s.solve = lambda *_, **__: open('begun', 'w').close() or {}\n"
 # counts on without ever looking at a signal, as a solver may; nobody is patient with it for as long as with users
 DEAF = PATIENT.format(1) + STANDS.format("sum(range(10**14))")
-# who listens has on a slow machine too the time to say so
+# patience with a listener on a slow machine [s]
 ASLEEP = PATIENT.format(300) + STANDS.format("__import__('time').sleep(1e4)")
 RUN = "from laufruhe.cli import main; main()"
 LONG = 300.0

@@ -25,7 +25,7 @@ from laufruhe.numerics.cores import processors
 PAGE = Path(__file__).parents[2] / "results" / "faults" / "README.md"
 LOG = PAGE.with_name("run.jsonl")
 CHUNK = 1000
-# of the files that `check` gets, `evaluate` and `explain` get one in so many of their own
+# `evaluate` and `explain` get one in so many of the files that `check` gets
 SAMPLE = 50
 
 ABOUT = f"""# Damaged files

@@ -87,7 +87,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
     assert [part.throw for part in turned] == [part.throw for part in problem.engine.cylinders][::-1]
     single = laufruhe.load({**tables, "engine": {**engine, "rod_ratio": 0.3, "cylinders": np.int64(1)}})
     assert len(single.engine.cylinders) == 1
-    # what was given stays as it was
+    # the arguments stay unchanged
     assert made["engine"]["throws"] is throws
     endless: dict[str, Any] = {}
     endless["engine"] = endless

@@ -48,7 +48,7 @@ class TestGearedTwin:
         one = PISTON * RADIUS * SPEED**2
         shaken = result.final.loads[0].wrench
         assert float(order_amplitude(shaken.at(1)[:3])) < 1e-3 * one
-        # what is left is of second order, and acts upright
+        # the remaining force is of second order, and upright
         assert float(order_amplitude(shaken.at(2)[:3])) == pytest.approx(2.0 * 0.2857 * one, rel=0.03)
 
     def test_forces_are_those_of_the_masses(self, tmp_path: Path) -> None:

@@ -230,7 +230,7 @@ class TestFiveCylinders:
         stars = np.exp(2j * math.pi / 5 * np.array([(0, *rest) for rest in permutations(range(1, 5))]))
         places = self.spacing * np.array([2, 1, 0, -1, -2])
         every = self.second * abs(stars**2 @ places)
-        # what rounding of F_II and reading of the drawing may add to the largest of them
+        # errors that rounding of F_II and reading of the drawing may add to the largest couple
         assert abs(every - 3260).min() > 5.0 * self.spacing * self.ratio * self.rounding + 5.0
         fits_first = abs(self.first * abs(stars @ places) - 1330) < self.drawn
         assert every[fits_first] == pytest.approx(couple, rel=1e-12)

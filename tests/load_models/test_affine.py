@@ -141,7 +141,7 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
                 np.testing.assert_allclose(result, one[:, used], rtol=0.0, atol=1e-11 * size)
         assert norm.grid.weights.sum() == pytest.approx(expected.grid.weights.sum(), rel=1e-12)
         assert norm.value(x) == pytest.approx(expected.value, rel=1e-11, abs=1e-11 * size)
-        # else every design and every gradient copies them
+        # otherwise every design and every gradient copies them
         assert norm.slope.flags.c_contiguous
         assert norm.constant.flags.c_contiguous
 

@@ -58,7 +58,7 @@ def test_automatic_holds_over_the_bounds(name: str, tolerance: float) -> None:
     assert np.abs(cheap / exact - 1.0).max() > 1e-7
     norm = designs.norms[problem.objective[0].measure]
     assert norm.coarser[0].rows.shape[2] < norm.rows.shape[2] // 8
-    # of few designs each is exact, because deciding takes longer
+    # few designs are each exact, because a decision takes longer
     assert designs.objective(values[:-1]) == pytest.approx(exact[:-1], rel=1e-13)
 
 

@@ -130,7 +130,7 @@ def _own_claims(document: Document, problem: Problem, result: Result, folder: Pa
         yield "its bound lies above its value"
     gap, still_open = (gap(value, certificate.lower_bound, nothing) for gap in (relative_gap, gap_of))
     if result.ranks:
-        # what later objectives may take of the first is no gap
+        # the loss that later objectives may cause to the first is no gap
         gap = still_open = max(rank.gap for rank in result.ranks)
     if abs(gap - certificate.gap) > 1e-6 * (1.0 + gap):
         yield f"its gap is {gap:.3g}, and {certificate.gap:.3g} is told"
@@ -163,7 +163,7 @@ def _loaded(document: Document, values: Mapping[str, float], order: list[int] | 
     """Return the problem with values of open numbers, written and read; throws without a value follow the order."""
     document = {key: own for key, own in document.items() if key != "phasing"}
     if values.get("s built") == 0.0:
-        # what is not built weighs nothing and stands nowhere
+        # a shaft that is not built has no mass and no place
         values = {**values, "s.unbalance": 0.0}
         limits = document.get("constraints", [])
         document["constraints"] = [limit for limit in limits if limit["limit"] != "shaft distance"]

@@ -212,7 +212,7 @@ def test_ever_smaller_loads_move_in_proportion():
     assert 1e20 * little.forces == pytest.approx(whole.forces, rel=1e-9)
 
 
-# what a scene excites
+# orders that a scene excites
 
 
 def test_symmetric_scene_excites_bounce_alone_and_computes_no_more():

@@ -145,7 +145,7 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
     problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, OBJECTIVES[name])
     measure, evaluation = problem.objective[0].measure, evaluate(problem)
     model, generator, ratios = BoxModel(problem, evaluation), np.random.default_rng(1), []
-    # of loads that are held no operating point is asked
+    # load cases have no operating point
     still = evaluate(replace(problem, points=()))
     for low, high in zip(*boxes(problem, 30, 3), strict=True):
         found = LINEAR_BOUNDS[measure.channel](model, measure, low[None], high[None])
@@ -242,7 +242,7 @@ def least_stiff(tmp_path_factory):
 
 
 def _by_evolution(problem) -> float:
-    # of loads that are held no operating point is asked
+    # load cases have no operating point
     evaluation, (limit,) = evaluate(replace(problem, points=())), problem.limits
 
     def worth(x):

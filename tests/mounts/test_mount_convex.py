@@ -163,5 +163,5 @@ def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch, factor):
     result = solve_convex_mounts(problem)
     assert result.certificate.kind is not Proof.GLOBAL
     assert result.status is Status.FEASIBLE
-    # what breaks a limit is not taken: the design as given is left
+    # a design that breaks a limit is discarded, and the initial one is left
     assert (result.objective.value == result.objective.initial) == (factor > 1.0)

@@ -72,7 +72,7 @@ class Calls:
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
         self.codes.clear()
         if (file := item.nodeid.partition("::")[0]) != self.file:
-            # what tests share is made anew for each file, so that its own tests are seen to call it
+            # shared results are computed anew for each file, so that its own tests call the code
             self.file, folder = file, Path(os.environ["LAUFRUHE_TESTS_SHARED"])
             shutil.rmtree(folder)
             folder.mkdir()
@@ -165,7 +165,7 @@ def outcome(mutant: Mutant, tests: list[str], source: Path, seconds: float) -> t
         for part in (tests[:FEW], tests[FEW:]):
             passed, failed = _forked(["-x", *part], source, seconds) if part else (True, [])
             if not passed:
-                # what ends before any test names all of them
+                # an end before any test names all tests
                 return KILLED, failed or part
         return SURVIVED, []
     finally:

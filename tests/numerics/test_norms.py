@@ -135,7 +135,7 @@ class TestEveryNorm:
         whole, z = norm.value(grid, v), norm.subgradient(grid, v)
         kinks = norm.subdifferential(grid, v, z)
         for own in () if kinks is None or whole <= 1e-200 else (kinks.base, *kinks.others):
-            # what counts as zero of a row, a length or a direction
+            # zero level of a row, a length or a direction
             assert float((own * v).sum()) == pytest.approx(whole, rel=5e-3)
             assert norm.dual_norm(grid, norm.balanced_dual(grid, own)) <= 1.0 + 5e-3
 
@@ -362,7 +362,7 @@ class TestDualRows:
         spread = norm.refined_dual(z, grid.steps, times)
         assert spread.shape == (len(fine.weights), 2)
         assert norm.dual_norm(fine, spread) <= norm.dual_norm(grid, z) * (1.0 + ROUNDING)
-        # what is spread over equal rows is neither more nor less
+        # spreading over equal rows changes no sum
         still = np.repeat(rng.standard_normal((len(signals) * PLACES, 1, 2)), grid.steps * times, axis=1)
         found, given_so = (float((rows.reshape(still.shape[0], -1, 2) * still[:, :1]).sum()) for rows in (spread, z))
         assert found == pytest.approx(given_so, abs=1e-12 * (1.0 + float(np.abs(z).sum())))

@@ -33,7 +33,7 @@ from laufruhe.numerics.workers import (
     working_on,
 )
 
-# what workers are asked for has to be found by them by its name: functions of Python's own, and of the package
+# functions that workers find by name: those of Python and of the package
 POWERS = [(k, 3) for k in range(40)]
 
 

@@ -204,7 +204,7 @@ CASES = [
 @pytest.mark.parametrize(("text", "of_bank", "gas", "name"), CASES)
 def test_no_angle_is_better_than_the_bound(text: str, of_bank: bool, gas: str, name: str) -> None:
     """Compare the bound with cone programs at fixed angles, and with the design."""
-    # of a pressure few samples know too little for the last digits
+    # few samples of a pressure do not give the last digits
     steps = changed(FEW, "360", "720") if gas else FEW
     problem = _read(text + gas + MOUNTS + WEIGHTS + steps + _objective(name))
     result = solve(problem)

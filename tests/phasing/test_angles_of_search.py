@@ -9,7 +9,7 @@ import pytest
 import laufruhe
 from laufruhe.problem.evaluation import evaluate, objective_value
 
-# of a six-cylinder only order 6 is left, along one line: the mean of |cos 6 phi| has corners between the angles
+# a six-cylinder has only order 6, along one line: the mean of |cos 6 phi| has corners between the angles
 SIX = """
 title = "Open stars of a six-cylinder"
 [engine]

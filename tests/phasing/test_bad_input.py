@@ -39,7 +39,7 @@ def test_infeasible_says_what_conflicts(tmp_path, cylinders, cycle, engine, phas
         raise AssertionError(result.message)
     assert "\n" not in result.message
     if result.problem.phasing.throws is not None:
-        # what cannot fire as given is no design to evaluate either
+        # throws that cannot fire are no initial design either
         given = evaluate_only(result.problem)
         assert (given.status, given.message) == (result.status, result.message)
 

@@ -47,7 +47,7 @@ def judge(problem):
 RIGID_SEEDS = [seed for seed in range(2, 160) if Writer(seed).mounts == RIGID]
 OTHER_SEEDS = [seed for seed in range(120) if Writer(seed).mounts not in (RIGID, OPEN)]
 OPEN_SEEDS = [seed for seed in range(50) if Writer(seed).mounts == OPEN]
-# those that take seconds each, and beyond the fast lane seven of eight
+# seeds that take seconds each, and seven of eight outside the fast lane
 LONG_RIGID = sorted(
     {9, 36, 60, 65, 102, 105, 111, 117, 121, 154, 155, *set(RIGID_SEEDS[16:]) - set(RIGID_SEEDS[16::8])}
 )

@@ -28,7 +28,7 @@ def test_steps_double_until_they_cost_little_enough():
     assert first.last.cost == pytest.approx(0.029)
     assert stage(maximum=200).last.programs == 192
     assert stage(enough=0.2).next is None
-    # what is left out grows faster than steps lose less
+    # the omitted part grows faster than further steps reduce the loss
     assert stage(left_out=lambda samples: 2.0 * samples).next is None
 
 

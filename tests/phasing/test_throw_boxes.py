@@ -129,7 +129,7 @@ def test_no_design_in_a_box_goes_under_its_bound(tmp_path, name):
         assert np.all(box.lower <= throws + 1e-9)
         assert np.all(throws <= box.upper + 1e-9)
         shares.append(box.bound / value)
-    # of a small box hardly anything is lost
+    # a small box loses hardly anything
     if problem.limits == ():
         assert shares[0] > 0.8
 

@@ -174,7 +174,7 @@ def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
     assert result.certificate.lower_bound <= minimum * (1.0 + 1e-5)
     assert result.objective.value <= minimum * (1.0 + 1e-4)
-    # of the peaks of a pressure that jumps few samples know little; a degree of irregularity has no boxes
+    # few samples miss peaks of a pressure that jumps; a degree of irregularity has no boxes
     assert result.certificate.gap < (0.3 if "maximum main" in quantity else 0.1) or "degree" in quantity
 
 

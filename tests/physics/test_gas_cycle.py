@@ -438,7 +438,7 @@ class TestTrace:
         result = cylinder_pressure(
             PressureTrace(tuple(angles), tuple(pressures)), PARTS["plain"], Cycle.TWO_STROKE, 5000
         )
-        # what a convex combination of two equal numbers may round to
+        # rounding of a mixture of two equal numbers
         assert result.min() > BAR * (1 - 1e-12)
         assert result.max() < 60 * BAR * (1 + 1e-12)
 
@@ -647,7 +647,7 @@ class TestCylindersAlike:
     def test_another_bore_rod_or_way_to_turn_is(self, part: SliderCrank) -> None:
         turned = replace(part, shaft=replace(part.shaft, ratio=-part.shaft.ratio))
         first = gas_coefficients(DIESEL, part, Cycle.FOUR_STROKE).coefficients
-        # what has no offset does the same to a crank that turns backwards
+        # without an offset the same holds for a crank that turns backwards
         for other in (replace(part, bore=0.11), replace(part, crank_radius=0.055), *([turned] if part.offset else [])):
             own = gas_coefficients(DIESEL, other, Cycle.FOUR_STROKE).coefficients
             assert not np.array_equal(own, first)

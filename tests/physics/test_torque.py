@@ -272,7 +272,7 @@ def test_two_orders_reach_the_torque() -> None:
         assert torque == pytest.approx(roll, abs=1e-10 * np.abs(roll).max())
         exact = crank_torque(own, still).sample(360)
         errors.append(float(np.abs(torque - exact).max() / np.abs(exact).max()))
-    # what is left out is of second order in the rod ratio
+    # the omitted part is of second order in the rod ratio
     assert errors[0] > 0.01
     assert errors[1] == pytest.approx(errors[0] / 16.0, rel=0.3)
     assert errors[2] == pytest.approx(errors[1] / 16.0, rel=0.1)

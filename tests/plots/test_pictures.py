@@ -113,7 +113,7 @@ def test_polar_diagrams_share_one_scale() -> None:
     for axes in figure.axes:
         spans = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
         larger = spans * (*axes.bbox.size[::-1],) / spans.max() / axes.bbox.width
-        # what a direction is enlarged by, its axis says
+        # the axis states the enlargement of its direction
         labels = {axes.get_xlabel(), axes.get_ylabel()} - {""}
         for times in (1.0 / larger)[larger < 0.99]:
             assert any(f"enlarged {times:.0f} times" in one.get_xlabel() + one.get_ylabel() for one in figure.axes), (

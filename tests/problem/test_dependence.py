@@ -144,7 +144,7 @@ def _entries(paths: Sequence[Path], rounds: int) -> Iterator[tuple[str, Channel,
     for number, path in enumerate(paths):
         problem = laufruhe.load(path)
         rng = np.random.default_rng(number)
-        # of any other number of the file nothing is claimed
+        # the table claims nothing of other numbers of the file
         for kind in sorted({d.kind for d in problem.decisions} - {Kind.NUMBER}):
             for _ in range(rounds):
                 try:

@@ -21,7 +21,7 @@ from laufruhe.prove.branch_and_bound import (
     widest,
 )
 
-# of random numbers in a row, those between two places bound a part from below
+# numbers in a row; the least between two places bounds a part from below
 Part = tuple[int, int]
 
 
@@ -48,7 +48,7 @@ class Least(BranchAndBound[Part]):
         for bound, _, (first, last) in nodes:
             self.looked.append(bound)
             if last - first == 1:
-                # of a round a number may come before its turn
+                # a number of the same round may come before its turn
                 self.value = min(self.value, bound)
                 continue
             middle = (first + last) // 2

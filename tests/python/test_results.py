@@ -87,7 +87,7 @@ def test_pictures_are_drawn_on_axes_and_figures_of_the_caller(result: laufruhe.R
             assert box is not None
             assert part.bbox.contains(box.x0, box.y0)
             assert part.bbox.contains(box.x1, box.y1)
-    # what is drawn to scale stays so
+    # pictures to scale keep their scale
     scale = [panel.transData.get_matrix() for panel in part.axes]
     assert scale[0][0, 0] == pytest.approx(scale[0][1, 1])
     assert abs(scale[1][0, 0]) == pytest.approx(scale[0][0, 0])

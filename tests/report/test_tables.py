@@ -244,7 +244,7 @@ def test_no_number_of_a_table_is_broken_by_a_narrow_screen(width: int) -> None:
     words = " ".join(lines).split()
     for cell in WIDE.rows[0][1:-1]:
         assert words.count(cell) == 1, cell
-    # what does not fit stands in a further table, whose rows are named again
+    # orders beyond the width stand in a further table, whose rows are named again
     assert words.count("front") == words.count("place")
     assert (words.count("front") == 1) == (width == 400)
 

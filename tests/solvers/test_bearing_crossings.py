@@ -119,7 +119,7 @@ def test_places_of_balancer_shafts_beside_bearings() -> None:
     assert found.objective.value <= minimum * (1.0 + 1e-3)
     assert found.certificate.lower_bound <= minimum
     assert minimum <= 1.05 * found.objective.value
-    # of a weight on the crank itself bearings feel the place, along a line between two of them (P20)
+    # the place of a weight on the crank changes bearing forces, along a line between two bearings (P20)
     moved = [{**WEBS[0], "x": open_place, "mass": "1 kg"}, *WEBS[1:]]
     carried = laufruhe.solve(problem_of({**tables, "counterweights": moved}, ""))
     assert carried.certificate.kind is Proof.GLOBAL

@@ -137,7 +137,7 @@ def test_contradicting_limits_have_no_solution() -> None:
     assert solve_cones(contradicted()).x is None
 
 
-# what a solver may say that has lost its way
+# statuses of a solver that fails
 STOPPED = {
     "no numbers": ("NumericalError", np.nan),
     "zero": ("InsufficientProgress", 0.0),

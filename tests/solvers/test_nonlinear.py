@@ -97,7 +97,7 @@ def test_an_optimum_is_recognised_by_its_residual():
         ((6.0, 3.0), -3.0, (0.0, 0.0), 0.2, 3.0 / 12.0),
         # the second variable at 0.25 has a multiplier of its upper side, 0.75 away; sums under one count as one
         ((0.0, -0.4), 0.0, (0.0, 0.4), 1.0, 0.4 * 0.75),
-        # what a limit is broken by counts as it is
+        # the violation of a limit counts unscaled
         ((-6.0, -3.0), 3.0, (0.0, 0.0), 1.7, 0.7),
     ],
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-# what the commands write is not kept
+# files that commands write are not committed
 WRITTEN = ROOT / "results"
 COMMITTED = (
     WRITTEN / "benchmarks",

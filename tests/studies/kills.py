@@ -174,7 +174,7 @@ def stopped(running: Sequence[subprocess.Popen[str]], rng: random.Random, whole:
         process.send_signal(stop)
     for _, stop, process in moments:
         said = process.communicate()[1]
-        # what an interrupted import of a library raises is its own affair
+        # errors of a library whose import was interrupted do not count
         # and an interrupt that falls into a callback of Python's own is lost
         importing = stop is not signal.SIGKILL and ("import" in said or "Exception ignored" in said)
         allowed = {0, -stop, *(() if stop is signal.SIGKILL else (130,))}

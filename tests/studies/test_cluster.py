@@ -46,7 +46,7 @@ def test_killed_clients_workers_and_schedulers_change_no_bit(
     assert finished >= KILLED_AT
     again = clusters.started(folder, "--scheduler", workers.address)
     clusters.wait_until(lambda: clusters.pieces_done(folder) > finished or again.poll() is not None)
-    # what it has in hand falls to the other
+    # the other worker takes over its piece
     workers.kill_worker(0)
     clusters.wait_until(lambda: clusters.pieces_done(folder) > finished + 1 or again.poll() is not None)
     workers.kill()

@@ -77,7 +77,7 @@ def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
     path.write_bytes(b"".join(whole) + cut[: rng.randrange(len(cut))])
     result = trusted(path)
     assert len(result) >= 4
-    # what is added after a line that was cut is not lost with it
+    # a point added after a line that was cut is not lost with it
     missing = next((k for k in range(5) if k not in result), 0)
     with FinishedPoints(path, MARKS) as store:
         store.keep(MARKS[missing], 0.25, RECORDS[missing])

@@ -84,7 +84,7 @@ def fits(kind: str, tables: dict[str, Any]) -> bool:
     if kind in ("counterweight fraction", "balancer sizing") and not closed:
         return False
     objective = tables["objective"]
-    # what comes first in an order of rank is what a study measures
+    # a study measures the first objective in an order of rank
     first = objective[0] if isinstance(objective, list) else objective
     quantity = first.get("minimise") or first["terms"][0]["quantity"]
     loads = not any(word in quantity for word in ("sag", "torque", "flywheel"))

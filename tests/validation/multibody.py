@@ -266,7 +266,7 @@ def simulate(
     # a multiplier is what its constraint exerts on the first of two markers, here the ground
     torques = [(ratio, -_read(model, sensor, selection)[:, 0]) for ratio, sensor in model.drives]
     reactions = _reactions(model, torques, selection) + _gas_wrench(machine, angles)
-    # what a bearing holds does not move; a wall does, with its piston
+    # a bearing is at rest; a wall moves with its piston
     held = [support for support in model.supports if isinstance(support.place, complex)]
     bearings = [support.frame * _plane(model, support.sensor, selection) for support in held]
     return Loads(angles, reactions, _momentum(model, torques, selection), np.stack(bearings, axis=1))

@@ -388,7 +388,7 @@ def test_the_ready_problem_is_proven() -> None:
     certificate = result.certificate
     assert certificate.kind.value.startswith("global")
     assert certificate.lower_bound <= result.objective.value <= certificate.lower_bound * (1.0 + 1e-4)
-    # what the web cannot hold of the first order turns against the crank
+    # the web leaves a part of the first order that turns against the crank
     lateral, vertical = result.final.loads[0].wrench.at(1)[1:3]
     assert abs(vertical - 1j * lateral) > 5.0 * abs(vertical + 1j * lateral)
 

@@ -28,7 +28,7 @@ ROD = ConnectingRod(LENGTH, mass=220.0, centre=0.8, inertia=0.7 * 220.0 * 0.8 * 
 
 
 def towards_crank(chambers: tuple[Chamber, ...], air: float, alpha: float) -> float:
-    """P = p1 F' - p2 F'' (eq. 296) of one rod at a crank angle from its inner dead centre [N]."""
+    """Return P = p1 F' - p2 F'' (eq. 296) of one rod at a crank angle from its inner dead centre [N]."""
     sine = math.sin(alpha)
     x = (RADIUS * (1.0 - math.cos(alpha)) + LENGTH - math.sqrt(LENGTH**2 - (RADIUS * sine) ** 2)) / (2.0 * RADIUS)
     force = 0.0

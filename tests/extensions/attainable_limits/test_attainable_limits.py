@@ -307,7 +307,7 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     assert shares[:2] == pytest.approx([0.2, 0.2])
     reach = [(step.done, step.whole) for step in steps if step.what == "attainable limits"]
     assert reach == [(0, 2), (1, 2)]
-    # whoever listens is told what is known before what takes longer
+    # a listener gets the known result before the slow part
     assert {step.within[0] for step in steps} == {none.message}
     assert "contradict" in none.message
 

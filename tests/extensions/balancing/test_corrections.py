@@ -19,7 +19,7 @@ from laufruhe.machine.rotor import permitted_unbalance
 
 Tables = dict[str, Any]
 STEEL = 7840.0
-# of the 200 random files of `plain_corrections`: all ways of holes, slugs and sectors, and every number of holes
+# some of the 200 random files of `plain_corrections`: all kinds of holes, slugs and sectors, and every number of holes
 SEEDS = (0, 4, 5, 13, 22, 37, 42, 55)
 
 

@@ -117,7 +117,7 @@ def test_tables_have_amplitude_and_phase(to: str, exported: Callable[[str], Path
             series = series_of(elastic, point, place, quantity, axis).sel(order=slice(None, 30.0))
             expected = series.sel(order=rows["order"].values).values
             assert rows["real"].values + 1j * rows["imaginary"].values == pytest.approx(expected, rel=1e-12)
-            # what is left out is a numerical zero
+            # omitted orders are numerical zeros
             largest = table.loc[table["quantity"] == quantity, "amplitude"].max()
             assert np.abs(series.drop_sel(order=rows["order"].values)).max() < 1e-7 * largest
             assert set(rows["grid"]) == {GRIDS[place]}

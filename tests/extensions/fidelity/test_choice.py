@@ -69,7 +69,7 @@ def test_gas_that_the_objective_cannot_see_is_dropped() -> None:
     choice = choose(tractor.problem(engine, [], tractor.GAS, objective=(force,)), 1e-3)
     assert not choice.fidelity.gas
     assert choice.error_estimate <= 1e-3
-    # of a force no gas loads, everything is told from the rod alone
+    # gas loads no force, so that the rod alone gives all orders
     assert choice.fidelity.orders is not None
     assert choice.fidelity.orders <= 8
 

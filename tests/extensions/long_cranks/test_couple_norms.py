@@ -78,7 +78,7 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
         window = own.window(family.space, family.space.patterns[0], maximum)
         couples = np.abs(star_sums(stars, family.space.phases, family.space.places, window.orders)[:, :, 1])
         assert (couples <= window.reaches)[exact <= maximum].all()
-        # those over a value may be told by less, never under it
+        # values above the maximum may be bounded from below, others are exact
         bounded = own.values(family.space, stars, maximum)
         assert bounded[low <= maximum] == pytest.approx(low[low <= maximum], rel=1e-12)
         assert (bounded[low > maximum] > maximum).all()

@@ -118,7 +118,7 @@ def test_columns_of_unbalances_reach_from_minus_one_to_one(seed: int) -> None:
         lifted = np.concatenate([[1.0], u])
         assert all(lifted @ matrix @ lifted <= 1e-12 for matrix in columns.sets)
     assert np.all(farthest <= 1.0 + 1e-12)
-    # of the sector less is reached
+    # the designs reach less of the sector
     assert np.all(farthest[:4] > 0.95)
 
 

@@ -243,7 +243,7 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
         order, k = orders[int(generator.integers(len(orders)))], int(generator.integers(len(parts)))
         mounts = parts[k]
         halves.add(k)
-        # of the load of all motions what half of them has
+        # the part of the load that half of the motions takes
         order = replace(order, loads=order.loads @ np.linalg.solve(parts[0].root.T, mounts.root.T))
         line = boxes.response(mounts, order, ANY, low, high)
         exact = truth(problem, parts[0], mounts, order, line, x, u)
@@ -265,7 +265,7 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
             whole = limit.constant + np.tensordot(exact.numbers, limit.slopes, 1) + moments
             assert np.linalg.eigvalsh(whole)[0] >= -1e-9 * max(1.0, np.abs(whole).max())
     assert count > 10
-    # of a matrix in space mirrored mounts share no numbers
+    # mirrored mounts share no numbers of a matrix in space
     assert halves == ({0} if "space" in name else {0, 1, 2})
 
 
@@ -341,7 +341,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, limits: str, tmp_path:
         below = np.clip(centre - 0.5 * share * (high - low), low, high - share * (high - low))
         above = below + share * (high - low)
         best, minimum = min(designs_of(problem, below, above, 40, 6), key=lambda pair: pair[1])
-        # what is known is a design that others of the box are better than
+        # the known design is worse than others of the box
         bound = SdpRelaxation(problem, 1.2 * minimum, 1e-3, best.tolist()).bound(below, above)[0]
         assert bound <= minimum * (1.0 + 1e-9)
         tight = max(tight, bound / minimum)
@@ -424,7 +424,7 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
     def wrong_by(by: float, noise: float) -> Any:
         return lambda self, cost, z: right(self, cost, spoilt(self, z, by, noise, generator))
 
-    # of several orders every one is bounded by itself, so that one way to be wrong is many
+    # each of several orders has its own bound, so that one kind of error has many chances
     ways = (wrong_by(2.0, 1e-3), wrong_by(2.0, 0.0), wrong_by(0.0, 0.0), wrong_by(0.0, 1.0))
     for wrong in ways[: 1 if name == "means" else 4]:
         monkeypatch.setattr(ConeProgram, "bound", wrong)
@@ -659,6 +659,6 @@ def test_a_share_of_a_norm_is_cut_off_at_the_norm_over_the_share(share: float, t
         look.cut_off([replace(variable, share=own, loss=0.0)], boxes._roots[0]).uppers[0] for own in (1.0, share)
     )
     assert part == pytest.approx(whole / share**2, rel=1e-12)
-    # what other orders may take off the norm is allowed to a root on top of it
+    # the reduction of the norm by other orders adds to the root
     lossy = look.cut_off([replace(variable, loss=0.3 * variable.unit)], boxes._roots[0]).uppers[0]
     assert math.sqrt(lossy) == pytest.approx(math.sqrt(whole) + 0.3, rel=1e-12)

@@ -169,7 +169,7 @@ def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None
     minimum = masses[shaken <= 1.02 * shaken.min()].min()
     assert result.ranks[1].final == pytest.approx(minimum, abs=0.004)
     assert result.ranks[0].final == pytest.approx(1.02 * result.ranks[0].minimum, rel=1e-5)
-    # what is given up is allowed, and no gap of the proof
+    # the allowed loss of the first objective is no gap of the proof
     assert result.certificate.gap == max(rank.gap for rank in result.ranks)
     assert result.certificate.kind is result.ranks[0].proof is result.ranks[1].proof is Proof.GLOBAL
 

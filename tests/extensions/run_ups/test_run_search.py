@@ -111,7 +111,7 @@ def test_the_design_keeps_its_limits_when_scipy_integrates_it(ready: tuple[Probl
         ]
         force, moved = (np.diff([end.value(m) for end in ends])[0] for m in (problem.objective[0].measure, OF_RUNS[1]))
         assert travel.shadow_price == pytest.approx(-force / moved, rel=5e-3)
-    # what is best without the limit breaks it
+    # the optimum without the limit breaks it
     free = laufruhe.solve(problem.changed(limits=problem.limits[:1]))
     assert not free.final.check_limit(problem.limits[1]).violation <= 0.0
     assert free.objective.value < result.objective.value

@@ -13,7 +13,7 @@ import pytest
 
 from laufruhe.extensions.served_page.latest_worker import Late, LatestWorker, Superseded
 
-# nobody waits as long for what has to happen
+# longest wait for an expected event [s]
 LONG = 600.0
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names here")]
 

@@ -38,7 +38,7 @@ CLAIMS = """() => {
   const all = { attributes: true, childList: true, characterData: true, subtree: true };
   new MutationObserver(note).observe(document.body, all);
 }"""
-# what stands on the page in the same moment as a slider moves, before anything could be answered
+# texts that the page shows as a slider moves, before any answer
 AT_ONCE = """([control, value]) => {
   const slider = document.querySelector(`[data-control="${control}"]`);
   slider.value = value;
@@ -121,7 +121,7 @@ def solved(path: Path, **values: str) -> float:
 def test_the_optimum_follows_a_limit_and_is_proven_when_it_rests(shown: Page, file: Path) -> None:
     free = settled(shown)
     assert free == pytest.approx(solved(file), rel=1e-6)
-    # what follows is soon what is proven, so the page itself notes it
+    # the proven answer soon replaces the estimate, so the page itself notes the estimate
     shown.evaluate(CLAIMS)
     slide(shown, MASS, 0.5)
     tight = settled(shown)

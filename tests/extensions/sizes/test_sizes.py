@@ -277,7 +277,7 @@ def test_sizes_without_added_mass_agree_with_a_geometric_program() -> None:
 
 def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
     text = changed(TEXT, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"')
-    # what the limit can reach is told beside it
+    # the result states what the limit can reach
     result = laufruhe.solve(loaded(tmp_path, text).changed(tolerance=1e-2))
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("maximum web stress",)

@@ -105,7 +105,7 @@ def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
     known: tuple = ()
     for _ in range(6):
         low, high = np.sort(model.lower + rng.random((2, 3)) * (model.upper - model.lower), axis=0)
-        # what dual rows of the box before say, too
+        # dual rows of the previous box bound this one too
         bound, cut = boxes.objective(low, high, known), boxes.cut(low, high, np.inf)
         for _ in range(20):
             x = low + rng.random(3) * (high - low)
@@ -129,7 +129,7 @@ def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
 
 def test_stresses_that_no_sizes_and_weights_meet_are_named() -> None:
     text = changed(FIXED_ROD, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"')
-    # what the limit can reach is told beside it
+    # the result states what the limit can reach
     result = laufruhe.solve(laufruhe.load(text).changed(tolerance=1e-2))
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("maximum web stress",)

@@ -247,7 +247,7 @@ def test_a_pendulum_holds_its_disc_still_in_its_order() -> None:
     inertia = 0.02 + 0.004 / (1.0 - 2.0**2 / 2.5**2)
     equal = replace(bare, discs=(replace(bare.discs[0], inertia=inertia), *bare.discs[1:]))
     for speed in (80.0, 200.0, 500.0):
-        # what drives the disc itself is taken up whole
+        # a torque on the disc itself is taken up whole
         assert np.abs(receptances(own, np.array([2.5]), speed)[0, :, 0]).max() < 1e-18
         assert np.abs(receptances(bare, np.array([2.5]), speed)[0, :, 0]).max() > 1e-8
         ours, theirs = (receptances(each, np.array([2.0]), speed) for each in (own, equal))

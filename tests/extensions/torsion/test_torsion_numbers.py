@@ -78,7 +78,7 @@ def test_a_shaft_under_a_limit_of_its_frequencies() -> None:
     """Check the crank diameter that leaves a band of frequencies, and its bound on a grid."""
     crank = {"pieces": [{"length": "70 mm", "diameter": {"between": ["40 mm", "60 mm"], "start": "48 mm"}}]}
     band = {"limit": "torsional frequencies", "outside": ["300 Hz", "345 Hz"]}
-    # of fewer starts none ends in the better half beside the band
+    # fewer starts all end in the worse half beside the band
     four = {"starts": 4}
     problem = problem_of({"crank": crank, "absorbers": []}, constraints=[band], search=four)
     result = laufruhe.solve(problem)
