@@ -37,7 +37,7 @@ STEPS, GAS_ORDERS = 24, 90
 # as many orders as are kept have no corners
 FINE = Fidelity(samples=STEPS, gas_samples=4 * GAS_ORDERS, gas_orders=GAS_ORDERS)
 FREE = 1e-20
-"""Of a stiffness over the largest: what is under it is a direction that no mount carries."""
+"""Share of the largest stiffness below which no mount carries a direction."""
 WHOLE_LOADS = Measure(channels.SHAKING_FORCE, NORMS["mean"]), Measure(channels.ROLL_MOMENT, NORMS["mean"])
 
 Digits = NDArray[np.object_]

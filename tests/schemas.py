@@ -39,7 +39,7 @@ _PLAIN = {
 _NUMBERS: Mapping[str, Any] = {"integer": 1, "number": 1.0, "string": "text", "boolean": True}
 CATALOGUE_TEXT = "Engine of the catalogue (laufruhe engines) that supplies every key which this table does not give."
 HOVER = ("description", "examples", "x-taplo")
-"""What of a key an editor shows."""
+"""Words of a key that an editor shows."""
 # a table within tables within a table is told by where it stands itself
 _DEPTH = 4
 

@@ -25,7 +25,7 @@ from attack.plain_scene import Table, terms_of
 from attack.rivals import Rival, best_star, convex_rival, least_broken, local_rival
 
 SAMPLED = 1e-5
-"""Of how a value is read, beside the error that the result states: samples of the plain model."""
+"""Relative accuracy of values read from samples of the plain model, beyond the stated error."""
 KINKED = 1e-4
 """The same where gas acts: its kinks lie between the samples of the plain model."""
 STEEP = 2.0

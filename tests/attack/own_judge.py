@@ -20,7 +20,7 @@ from attack.plain_scene import terms_of
 
 EXACT = 1e-9
 SAMPLED = {"peak to peak": 2e-6, "maximum": 2e-7, **dict.fromkeys(OF_RUNS, 1e-3)}
-"""Of quantities of which the own model knows less, what it reads them to."""
+"""Relative accuracy of quantities that the own model reads from samples."""
 SPARED = 1e-9
 """Share of its limits that a design must have to spare before it counts against 'infeasible'."""
 EXCESS = 1.1e-6

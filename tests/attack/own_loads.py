@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 Table = dict[str, Any]
 STEPS = 512
-"""Of the cycle, for what moves: orders of a slider-crank fall by its rod ratio or faster."""
+"""Steps of the cycle for moving parts: orders of a slider-crank fall by its rod ratio or faster."""
 HIGHEST = 1024
 """Last harmonic of the cycle that gas keeps."""
 AIR = 101325.0

@@ -13,9 +13,9 @@ from attack.crossings import CROSSINGS
 
 TARGET = 2000
 SEEDS = 3
-"""What the attack is meant to reach: so many problems of every family, from so many first seeds together."""
+"""Least number of problems of every family, and of the first seeds among them."""
 VARIED = 30
-"""And so many of each variation of a kind."""
+"""Least number of each variation of a kind."""
 
 FAMILIES = {
     "rigid mounts": (

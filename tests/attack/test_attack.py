@@ -31,7 +31,7 @@ SEEDS = {
     "prices of elastic-balance": (1,), "prices of convex-mounts": (1,),
     "monotony of inline": (2,), "invariance of convex-mounts": (1,), "invariance of inline": (2,),
 }  # fmt: skip
-"""Of problems that take a second at most, with and without a design."""
+"""Seeds of problems that take a second at most, with and without a design."""
 
 
 MORE = {

@@ -21,7 +21,7 @@ from attack.plain_scene import Table, terms_of
 STEP = 0.01
 """Share by which a limit is moved."""
 READING = 2e-5
-"""Of a value: two results need not have the same samples of a cycle."""
+"""Relative accuracy of a value: two results need not have the same samples of a cycle."""
 Complaints = list[str]
 
 

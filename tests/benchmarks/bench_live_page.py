@@ -32,7 +32,7 @@ from laufruhe.report.web_page import as_html
 
 OUT = PAGES / "live-page.md"
 FRAME = 16.0
-"""Of a screen with 60 pictures a second [ms]."""
+"""Time of one of 60 pictures a second [ms]."""
 MOVES, UPDATES = 240, 40
 FOUR = ROOT / "problems" / "tractor-four-lanchester.toml"
 TWELVE = ROOT / "problems" / "inline-twelve.toml"

@@ -35,7 +35,7 @@ SOLVED = ("tractor-four-lanchester", "tractor-single", "boxer-four", "inline-fiv
 OUT = PAGES / "solve.md"
 
 Times = tuple[float, float]
-"""Of a processor, and until it is done."""
+"""Seconds of a processor, and until the end."""
 Row = tuple[str, Times, str, Times]
 
 READS = "import numpy, typer; from pydantic import BaseModel"

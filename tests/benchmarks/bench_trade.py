@@ -60,7 +60,7 @@ WORDS = {"evaluation": "evaluate", "solve": "solve", "scene": "scene of a sweep"
 AUTO = {"kinematics": "auto", "tolerance": 1e-3}
 ROUNDS = 3
 LOWEST, BEYOND = 1e-8, 20.0
-"""What is under it is drawn at it; and where designs beyond a limit are."""
+"""Least value that is drawn, and place of designs beyond a limit."""
 
 
 def draw(trades: list[dict[str, Any]]) -> None:

@@ -21,7 +21,7 @@ from pages import ROOT, SKIPPED
 FOLDER = Path(__file__).parent
 SCRIPTS = {path.stem.removeprefix("bench_"): path for path in sorted(FOLDER.glob("bench_*.py"))}
 LIMIT = 900.0
-"""Of one script [s]."""
+"""Limit of time of one script [s]."""
 LINES = 15
 
 

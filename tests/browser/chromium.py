@@ -22,7 +22,7 @@ LOOPBACK = "127.0.0.1"
 GRAVE = {"serious", "critical"}
 SCREEN = {"width": 1280, "height": 720}
 PATIENCE = 120_000
-"""With whatever a page is waited for [ms]; what comes sooner is not waited for."""
+"""Longest wait for any event of a page [ms]."""
 expect.set_options(timeout=PATIENCE)
 
 

@@ -13,7 +13,7 @@ from laufruhe.prove.certificate import Proof
 
 INPUTS = Path(__file__).parent / "inputs"
 TRUE_MEAN = 46.10256
-"""Of the best places, at 115,200 angles [N m]."""
+"""Mean at the best places, at 115,200 angles [N m]."""
 
 
 def test_a_mean_is_read_at_the_angles_of_its_bound() -> None:

@@ -16,7 +16,7 @@ LEAST, MOST = {"min", "minimum", "fmin", "clip"}, {"max", "maximum", "fmax"}
 VALUES = {"value", "cutoff", "known", "best", "level", "maximum"}
 """Names of what is known of designs."""
 BOUNDS = ("bound", "divide", "floor", "found", "minimum", "looked", "total")
-"""What names of bounds have in them."""
+"""Parts of names of bounds."""
 ALLOWED = {
     # bounds of all designs up to a level hold below it, and cut-off parts are not below theirs
     "min(looked[0], first.level)",

@@ -18,7 +18,7 @@ from laufruhe.solvers.accuracy import objective_error
 
 SEEDS = first_fast(range(60), 8, 13)
 POWERS = {channels.MOUNT_FORCE: 1, channels.SHAKING_FORCE: 1, channels.ROLL_MOMENT: 2, channels.ROCKING_COUPLE: 2}
-"""Of length beside mass over time squared, in what a channel measures."""
+"""Power of length in each channel, beside mass over time squared."""
 
 
 def _value(problem: Problem) -> tuple[float, float]:

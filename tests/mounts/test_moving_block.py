@@ -35,11 +35,11 @@ from laufruhe.physics.shaking_loads import shaking_loads
 RADIUS, ROD, SPEED = 0.06, 0.23, 2 * math.pi * 15.0
 """Crank radius and rod length [m], crank speed [rad/s]."""
 MASS, INERTIA = 100.0, 6.0
-"""Of the block without the piston [kg], [kg m2]; its centre of gravity is on the crank axis."""
+"""Mass and roll inertia of the block without the piston [kg], [kg m2]; its centre of gravity is on the crank axis."""
 PLACES, STIFFNESS, DAMPING = ((-0.25, -0.1), (0.25, -0.1)), (6e4, 9e4), (600.0, 900.0)
-"""Of the mounts: (y, z) [m]; lateral and vertical [N/m], [N s/m]."""
+"""Mounts: (y, z) [m]; lateral and vertical stiffness [N/m] and damping [N s/m]."""
 STEPS, TURNS = 720, 30
-"""Of a turn, and until the start has died away: by e^-12 at the least damped motion."""
+"""Steps of a turn, and turns until the start has decayed by e^-12 in the least damped motion."""
 
 
 def linear_forces(piston: float, angles: np.ndarray, flywheel: float = 0.0, turns: bool = True) -> np.ndarray:

@@ -39,7 +39,7 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 SPECTRAL_RADIUS = 0.9
-"""Of the generalised-alpha method: what the start excites falls by this factor a step."""
+"""Spectral radius of the generalised-alpha method: the factor by which a start decays in a step."""
 
 RUN_IN = 180
 """Steps before the first one that is kept; 0.9^180 is 6e-9 of a start that is consistent already."""

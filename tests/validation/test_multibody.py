@@ -33,7 +33,7 @@ FloatArray = NDArray[np.float64]
 
 COARSE, FINE = 720, 1440
 ROUNDING = 1e-7
-"""Of the simulation, which takes accelerations from positions."""
+"""Rounding of the simulation, which takes accelerations from positions."""
 
 SPEED = 200.0
 RADIUS, LENGTH, PISTON, BORE = 0.050, 0.200, 1.0, 0.090
