@@ -81,12 +81,12 @@ def test_true_claims_raise_no_complaint(example: tuple[Table, Result]) -> None:
     ],
     ids=["value", "bound", "infeasible", "failed"],
 )
-def test_a_lie_is_found_out(lie: Any, message: str, example: tuple[Table, Result]) -> None:
+def test_a_false_claim_is_detected(lie: Any, message: str, example: tuple[Table, Result]) -> None:
     table, result = example
     assert message in complaints(table, lie(result))
 
 
-def test_a_design_that_is_not_the_best_is_found_out(example: tuple[Table, Result], tmp_path: Path) -> None:
+def test_a_suboptimal_design_is_detected(example: tuple[Table, Result], tmp_path: Path) -> None:
     """Check that the optimum within a tighter limit, claimed for the looser one, is reported."""
     table, result = example
     tighter = [{**limit, "max": f"{0.8 * number(limit['max'])} kg"} for limit in table["constraints"]]

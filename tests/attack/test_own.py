@@ -124,7 +124,7 @@ def complaints(table: Table, result: Any) -> str:
     ],
     ids=["truth", "value", "bound", "infeasible"],
 )  # fmt: skip
-def test_a_lie_is_found_out(lie: Any, message: str, example: tuple[Table, Result]) -> None:
+def test_a_false_claim_is_detected(lie: Any, message: str, example: tuple[Table, Result]) -> None:
     table, result = example
     lines = complaints(table, lie(result))
     assert message in lines

@@ -117,7 +117,7 @@ def test_a_limit_that_holds_leaves_at_least_the_bound_without_it(problem: Proble
 
 
 @pytest.mark.slow
-def test_a_term_that_no_closing_method_knows_takes_its_own_share_alone(problem: Problem) -> None:
+def test_a_term_without_a_closing_method_has_its_own_share(problem: Problem) -> None:
     (limit,), (term,) = problem.limits, problem.objective
     both = problem.changed(objective=(term, Term(Measure(limit.measure.channel, orders=(1.0,)), 3.0)), limits=())
     result, alone = laufruhe.solve(both), laufruhe.solve(problem.changed(limits=()))

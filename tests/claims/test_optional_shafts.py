@@ -39,7 +39,7 @@ def with_shaft(scene: dict[str, Any]) -> dict[str, Any]:
     ],
     ids=["uneven", "with an order", "two-stroke", "vee"],
 )
-def test_a_shaft_that_may_be_built_is_worth_what_it_is_worth_built(engine: dict[str, Any]) -> None:
+def test_an_optional_shaft_has_the_value_of_a_built_one(engine: dict[str, Any]) -> None:
     """Compare an optional shaft with the same shaft built, with free firing intervals."""
     scene = table(**engine)
     free, built = laufruhe.solve(scene), laufruhe.solve(with_shaft(scene))

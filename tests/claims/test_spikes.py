@@ -53,7 +53,7 @@ def of_design(result: Any, pressure: np.ndarray, norm: str) -> float:
 
 
 @pytest.mark.slow
-def test_a_bound_allows_for_what_nobody_measured_between_two_points() -> None:
+def test_a_bound_allows_for_a_straight_trace_between_points() -> None:
     """Check the bound below a design of 39.0541 N m on a straight trace; 39.2356 would be false."""
     result = laufruhe.solve(INPUTS / "spike.toml")
     pressure = np.ones(1440)

@@ -92,7 +92,7 @@ def test_a_channel_that_no_bound_names_is_decided_locally(
 
 
 @pytest.mark.slow
-def test_a_norm_that_claims_nothing_is_decided_locally(worst_twentieth: Norm) -> None:
+def test_a_norm_without_claims_is_decided_locally(worst_twentieth: Norm) -> None:
     text = SPRINGS.read_text().replace("rms transmitted force", f"{worst_twentieth.name} mount force")
     problem = laufruhe.load(text)
     result = laufruhe.solve(problem.changed(search=replace(problem.search, starts=1)))

@@ -91,7 +91,7 @@ def is_withheld(result: Result, best: float) -> bool:
         "klein-steam-pump",
     ],
 )
-def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
+def test_a_suboptimal_design_is_detected(name: str) -> None:
     result = solved(name)
     assert result.objective is not None
     lie = marked_optimal(result)
@@ -104,7 +104,7 @@ def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["study-soft-mounts", "worked-diesel", "locomotive-two-cylinder"])
-def test_a_design_that_is_said_not_to_exist_is_found(name: str) -> None:
+def test_a_design_denied_by_a_result_is_found(name: str) -> None:
     """Check that a walk finds the design, from an initial one that breaks a limit or near a limit."""
     result = solved(name)
     lie = replace(
@@ -118,7 +118,7 @@ def test_a_design_that_is_said_not_to_exist_is_found(name: str) -> None:
 
 
 @pytest.mark.parametrize("rank", [1, 2])
-def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
+def test_a_wrongly_pruned_star_is_detected(rank: int) -> None:
     result = solved("inline-five-open")
     phasing, ranked = result.problem.phasing, result.phasing
     assert phasing is not None
@@ -232,7 +232,7 @@ def test_a_channel_declared_constant_by_mistake_is_detected(monkeypatch: pytest.
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("transmitted")
-def test_a_norm_and_a_channel_that_nobody_knows_are_claimed_nothing_false_of(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_false_claim_about_an_unknown_norm_and_channel(monkeypatch: pytest.MonkeyPatch) -> None:
     norm, channel = WorstTwentieth(), "transmitted force"
     monkeypatch.setitem(NORMS, norm.name, norm)  # type: ignore[arg-type]
     monkeypatch.setitem(MEASURES, f"{norm.name} {channel}", (CHANNELS[channel], norm))  # type: ignore[arg-type]

@@ -24,7 +24,7 @@ def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPa
     return files | {name: svg.encode() for name, svg in actual.items()}
 
 
-def test_by_whom_a_picture_is_drawn_cannot_be_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_picture_does_not_depend_on_its_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compare pictures of an open crank drawn in this process and in two processes."""
     result = solved("two-stroke-four-open")
     here, there = (drawn(result, tmp_path / str(count), count, monkeypatch) for count in (0, 2))

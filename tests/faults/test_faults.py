@@ -245,7 +245,7 @@ def test_too_much_at_once_is_refused_in_a_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("key", ["orders", "mounts", "operating_points"])
-def test_a_measure_of_nothing(key: str, tmp_path: Path) -> None:
+def test_a_measure_of_zero(key: str, tmp_path: Path) -> None:
     limit = f'[[constraints]]\nlimit = "mean mount force"\nmax = "1 N"\n{key} = []\n'
     refused(written(tmp_path, scenes.GIVEN + limit), f"constraints[1].{key}", "is empty")
 

@@ -35,7 +35,7 @@ def held(path: Path) -> Problem:
 
 
 @pytest.mark.parametrize("path", ELASTIC, ids=lambda path: path.stem)
-def test_modes_that_nothing_excites_answer_nothing(path: Path) -> None:
+def test_modes_without_excitation_have_no_response(path: Path) -> None:
     """Compare motion with the whole matrices in the coordinates of the block."""
     problem = held(path)
     engine, point = problem.engine, problem.points[0]

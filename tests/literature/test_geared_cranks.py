@@ -145,7 +145,7 @@ class TestOpposedPistons:
     """Fig. 3.5: "complete balance since the two pistons have exactly the same acceleration ... at all times"."""
 
     @pytest.mark.parametrize("ratio", [1, -1])
-    def test_in_step_nothing_is_left(self, ratio: int, tmp_path: Path) -> None:
+    def test_no_force_remains_in_step(self, ratio: int, tmp_path: Path) -> None:
         text = changed(OPPOSED, "crank_lead = 12", f"crank_ratio = {ratio}")
         shaken = evaluate(loaded(tmp_path, text)).loads[0].wrench
         one = O_PISTON * O_RADIUS * O_SPEED**2

@@ -39,7 +39,7 @@ def least_deviation(cycle, throws, angle):
 
 @pytest.mark.parametrize("angle", [0, 20, 45, 60, 66, 90, 120, 174])
 @pytest.mark.parametrize(("cycle", "throws"), [(Cycle.TWO_STROKE, 2), (Cycle.FOUR_STROKE, 2), (Cycle.TWO_STROKE, 3)])
-def test_nothing_is_more_even(cycle, throws, angle):
+def test_no_pattern_is_more_even(cycle, throws, angle):
     patterns, complete = slots(cycle, throws, angle, 0.0).patterns()
     result = max(abs(i - cycle.angle / throws / 2) for i in patterns[0].intervals(cycle))
     assert complete

@@ -188,7 +188,7 @@ class TestFiring:
         result = firing_angles(cycle, layout, tuple(map(math.radians, throws)), order)
         assert np.degrees(result) == pytest.approx(fires, abs=1e-9)
 
-    def test_intervals_that_are_given_are_those_of_the_dead_centres(self) -> None:
+    def test_given_intervals_are_those_of_the_dead_centres(self) -> None:
         """Check three throws that fire at 0, 200 and 450 deg in any order; another interval is refused."""
         for order in ([1, 2, 3], [1, 3, 2]):
             fires = dict(zip(order, (0.0, 200.0, 450.0), strict=True))

@@ -239,7 +239,7 @@ def test_signals_of_operating_points_have_as_many_rows_each(tmp_path: Path) -> N
     assert result.objective.value <= result.objective.initial
 
 
-def test_an_end_without_numbers_says_nothing_on_the_screen(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_end_without_numbers_prints_no_warning(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Four throws at right angles cancel the second order: a variable over it has no slope where a search starts."""
     engine = ENGINE.replace("[0, 180, 180, 0]", "[0, 90, 180, 270]").replace("rod_ratio = 0.26", "rod_ratio = 0.0")
     lossy = MOUNTS.replace('position  = ["300 mm"', 'loss_factor = { between = [0.02, 0.3] }\nposition  = ["300 mm"')

@@ -156,7 +156,7 @@ def test_nonconvex_mount_problems_are_recognised(tmp_path):
 
 
 @pytest.mark.parametrize("factor", [0.9, 1.1])
-def test_a_solver_that_lies_is_found_out(tmp_path, monkeypatch, factor):
+def test_a_lying_solver_is_detected(tmp_path, monkeypatch, factor):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG)
     honest = ConvexProgram.solve
     monkeypatch.setattr(ConvexProgram, "solve", lambda self: (factor * honest(self)[0], honest(self)[1]))

@@ -282,7 +282,7 @@ def test_unbalances_on_fixed_elastic_mounts_are_proven_globally(tmp_path):
 
 
 @pytest.mark.slow
-def test_with_mounts_held_the_search_ends_at_the_proven_balance(tmp_path):
+def test_the_search_with_fixed_mounts_ends_at_the_proven_balance(tmp_path):
     """The nonlinear route, given a limit that never binds, must reproduce the cone program's optimum."""
     fixed = MOUNTS.replace('{ between = ["20 N/mm", "4000 N/mm"], start = "400 N/mm" }', '"300 N/mm"')
     parts = (ENGINE, BLOCK, fixed, SHAFTS, FORCE.format(measure="mean"))
@@ -374,7 +374,7 @@ def test_an_active_limit_on_a_load_has_a_price(tmp_path):
 
 
 @pytest.mark.parametrize("starts", [1, 3])
-def test_a_search_has_as_many_starts_as_it_is_given(starts, tmp_path):
+def test_a_search_has_the_chosen_number_of_starts(starts, tmp_path):
     """Check that the initial design is first, the others within bounds, and that no time returns it."""
     objective = '[objective]\nminimise = "static sag"\n'
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, f"[search]\nstarts = {starts}\n")
@@ -432,7 +432,7 @@ def test_constant_terms_are_numbers_of_the_program(tmp_path):
     assert at(mixed, start)[0] == pytest.approx(at(plain, start)[0] + own, rel=1e-9)
 
 
-def test_unbalances_on_the_mounts_of_a_design_become_the_best_of_these_mounts(tmp_path):
+def test_unbalances_become_the_best_for_the_mounts_of_a_design(tmp_path):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SHAFTS, FORCE.format(measure="rms"))
     poor = evaluate_design(problem, problem.start)
     found, gap = _rebalanced(SearchResult(poor, MountSearch(problem, evaluate(problem)).joint))

@@ -28,7 +28,7 @@ def limited(limit: str, maximum: str) -> str:
         ("peak to peak mount force", "1 N", Status.INFEASIBLE),
     ],
 )
-def test_a_design_with_nothing_open_is_held_to_its_limits(
+def test_limits_apply_to_a_design_without_open_numbers(
     tmp_path: Path, limit: str, maximum: str, status: Status
 ) -> None:
     parts = (ENGINE, BLOCK, GIVEN, CHEAPEST, limited(limit, maximum))

@@ -48,6 +48,6 @@ def test_many_together_are_as_one_by_one() -> None:
     np.testing.assert_allclose(enclosing_balls(points).radii, alone, rtol=1e-14)
 
 
-def test_nothing_has_no_ball() -> None:
+def test_an_empty_set_has_no_ball() -> None:
     assert enclosing_balls(np.zeros((0, 5, 3))).radii.shape == (0,)
     np.testing.assert_array_equal(enclosing_balls(np.zeros((2, 5, 3))).radii, 0.0)

@@ -262,7 +262,7 @@ def test_weights_at_a_fixed_angle_are_bounded() -> None:
     assert result.certificate.gap <= 2e-4
 
 
-def test_weights_that_know_how_far_pins_are_apart_have_no_boxes() -> None:
+def test_weights_that_depend_on_pin_offsets_have_no_boxes() -> None:
     """A share of what turns on offset pins is another weight at every offset: a bound from one would be false."""
     share = '[[counterweights]]\nname = "share"\nbalance_factor = 0.5\n'
     problem = _read(SPLIT + MOUNTS + share + _objective("rms shaking force"))

@@ -123,7 +123,7 @@ def test_refused(tmp_path, cylinders, engine, phasing, rest, said):
 
 
 @pytest.mark.parametrize("key", ["stroke", "reciprocating_mass"])
-def test_open_throws_ask_for_what_given_throws_ask_for(key):
+def test_open_throws_need_the_keys_of_given_throws(key):
     tables = {"stroke": '"100 mm"', "reciprocating_mass": '"1 kg"'}
     keys = "\n".join(f"{name} = {value}" for name, value in tables.items() if name != key)
     head = f'layout = "inline"\ncycle = "four-stroke"\ncylinders = 4\nrod_ratio = 0.28\n{keys}'

@@ -184,7 +184,7 @@ def test_without_gas_two_rods_on_a_pin_are_decided() -> None:
         assert one.final.value(one.problem.objective[0].measure) == pytest.approx(star.value, rel=1e-6)
 
 
-def test_rows_of_stresses_that_one_throw_brings_to_the_next_are_those_of_the_exact_model() -> None:
+def test_stress_rows_across_throws_are_those_of_the_exact_model() -> None:
     """Check the torque that a journal takes from the throws before it."""
     gear = {"webs": {"thickness": "25 mm", "width": "110 mm"}}
     whole = tables(4, {"minimise": "rms journal stress"}, running_gear=gear,

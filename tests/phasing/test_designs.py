@@ -94,7 +94,7 @@ def _turn(decision):
 
 
 @pytest.mark.parametrize("built", [(), (0,), (1,), (0, 1)])
-def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, built):
+def test_a_set_of_shafts_has_the_value_of_an_engine_with_these_alone(tmp_path, built):
     """Compare a set of built shafts on one star with the problem of these shafts alone."""
     weight = engines.WEIGHTS.partition('[[counterweights]]\nname = "rear"')[0]
     problem = engines.problem(tmp_path, 3, rest=engines.MOUNTS + weight + TWO_SHAFTS + engines.MOUNT_FORCE)
@@ -132,7 +132,7 @@ def test_a_shaft_that_no_design_needs_is_not_built(tmp_path):
     assert built == {"against built": 1.0, "third built": 0.0}
 
 
-def test_a_limit_that_nothing_open_moves_leaves_a_star_its_optimum(tmp_path):
+def test_a_constant_limit_leaves_the_optimum_of_a_star(tmp_path):
     """Check that design and bound equal those without the constant limit, with another one active."""
     fixed = '[[constraints]]\nlimit = "mean mount force"\norders = [2]\nmax = "1e6 N"\n'
     binding = CASES["limited"].partition("[[constraints]]")
@@ -301,7 +301,7 @@ def test_a_limit_at_its_edge_excludes_no_star(tmp_path):
 
 
 @pytest.mark.parametrize(("bank", "split"), [((60, 90), 0), (90, (-30, 30))])
-def test_angles_as_given_are_those_of_the_design_that_is_evaluated(bank, split):
+def test_initial_angles_are_those_of_the_evaluated_design(bank, split):
     both = [angle if isinstance(angle, int) else {"between": list(angle)} for angle in (bank, split)]
     text = {
         "title": "ten", "engine": {
@@ -321,7 +321,7 @@ def test_angles_as_given_are_those_of_the_design_that_is_evaluated(bank, split):
     assert given == pytest.approx(72.0 if isinstance(split, int) else -18.0)
 
 
-def test_a_star_that_breaks_a_limit_which_nothing_open_moves_is_no_design(tmp_path):
+def test_a_star_that_breaks_a_constant_limit_is_no_design(tmp_path):
     """Weights of order 1 move nothing of order 2: its own couple keeps the limit or breaks it, star by star."""
     rest = engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
     limit = '[[constraints]]\nlimit = "rms rocking couple"\norders = [2]\nmax = "{:.9g} N m"\n'

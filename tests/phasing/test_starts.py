@@ -60,7 +60,7 @@ def test_bounded_stars_lie_within(tmp_path, order):
     assert np.degrees(even[0]) % 360.0 == pytest.approx([0.0, 180.0, 180.0, 0.0])
 
 
-def test_a_throw_between_bounds_needs_nothing_beside_it(tmp_path):
+def test_one_throw_between_bounds_is_enough(tmp_path):
     """A four whose last throw is open is no worse than the even one, which the search starts from."""
     engine = "throws = [0, 180, 180, { between = [0, 360] }]\nfiring_order = [1, 3, 4, 2]"
     even = "throws = [0, 180, 180, 0]\nfiring_order = [1, 3, 4, 2]"
@@ -110,7 +110,7 @@ def test_shafts_that_may_not_be_built_are_not(tmp_path):
     assert sum(d.value for d in result.decisions if d.name.endswith("built")) <= 1
 
 
-def test_throws_whose_middles_fire_at_once_start_beside_them(tmp_path):
+def test_throws_whose_middles_fire_at_once_start_near_them(tmp_path):
     """Banks and pins 120 degrees apart: throws at 0, 120 and 240 would fire in pairs, and have no order."""
     engine = """throws = [0, { between = [108, 132] }, { between = [228, 252] }]
 bank_angle = 90

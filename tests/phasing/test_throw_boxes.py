@@ -290,7 +290,7 @@ def test_a_limit_that_no_crank_keeps_is_named(tmp_path):
     assert result.certificate.gap < 0.05
 
 
-def test_rows_lose_only_components_that_nothing_loads():
+def test_compressed_rows_lose_only_zero_components():
     """Check that compression removes only the component without constant, slope and wave."""
     constant, slope = np.zeros((5, 4)), np.zeros((5, 4, 2))
     waves = np.zeros((1, 2, 5, 4), dtype=complex)

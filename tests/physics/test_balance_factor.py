@@ -46,7 +46,7 @@ def test_a_workshop_counts_the_same() -> None:
     assert [one.factor for one in result] == pytest.approx([(65.0 - 18.0) / 27.0], rel=1e-12)
 
 
-def test_a_weight_of_nothing_is_none() -> None:
+def test_a_weight_of_zero_is_none() -> None:
     assert balance_factors(engine(SINGLE, 'name = "web"\nopposite_throw = 1\nunbalance = "0 kg m"')) == ()
 
 

@@ -54,7 +54,7 @@ def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...],
     assert ended > 30
 
 
-def test_a_map_that_sees_nothing_has_no_rest_however_far_motion_goes() -> None:
+def test_a_zero_map_has_no_remainder() -> None:
     maps = scene(3, (1, 1))
     sides, wide = directions_of([[side.real] for side in maps["sides"]]), np.full((1, 2), 50.0)
     inverse = np.linalg.inv(maps["middle"])
@@ -65,7 +65,7 @@ def test_a_map_that_sees_nothing_has_no_rest_however_far_motion_goes() -> None:
     assert np.all(np.isinf(mapped(at, maps["value"][None]).remainder))
 
 
-def test_a_number_of_no_width_moves_nothing() -> None:
+def test_a_number_of_no_width_has_no_effect() -> None:
     maps = scene(5, (2, 1))
     sides, wide = directions_of([[side.real] for side in maps["sides"]]), np.array([[0.05, 0.0]])
     inverse = np.linalg.inv(maps["middle"])

@@ -97,7 +97,7 @@ def test_named_places_are_middles_of_the_least_boxes() -> None:
         assert np.abs(middle - place).max() < 1.5
 
 
-def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
+def test_no_allowed_value_leaves_no_box_and_no_time_the_whole() -> None:
     search = Least(np.arange(8.0))
     assert search.divide(INFEASIBLE_PART, 10) == math.inf
     assert search.complete

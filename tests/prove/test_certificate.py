@@ -128,7 +128,7 @@ class TestGap:
         assert result.kind is Proof.GLOBAL
         assert result.gap == pytest.approx(1e-4)
 
-    def test_nothing_is_a_rounding_of_the_parts_and_not_of_the_sum(self, tmp_path: Path) -> None:
+    def test_zero_is_a_rounding_of_the_parts_not_of_the_sum(self, tmp_path: Path) -> None:
         """A balanced six has the parts of a single cylinder six times; soft mounts have no resonance of their own."""
         six = problem_of(tmp_path, SIX)
         assert objective_value(six, evaluate(six)) < numerical_zero(six)
@@ -139,7 +139,7 @@ class TestGap:
         assert numerical_zero(six) == pytest.approx(6.0 * (ROUNDING * parts + OF_ORDERS * whole), rel=1e-9)
 
     @pytest.mark.parametrize(("order", "none"), [(1, True), (2, False)])
-    def test_an_order_that_a_part_does_not_have_is_nothing(self, order: int, none: bool, tmp_path: Path) -> None:
+    def test_an_order_absent_from_a_part_counts_as_zero(self, order: int, none: bool, tmp_path: Path) -> None:
         """A scotch yoke turns its crank by the second order alone: of the first there is a rounding of that."""
         yoke = SIX.replace("0.27", "0.0").replace("orders = [1, 2]", f"orders = [{order}]")
         problem = problem_of(

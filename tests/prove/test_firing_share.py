@@ -58,7 +58,7 @@ def test_a_six_in_line_reaches_it() -> None:
     assert str(result.certificate.kind) == "global"
 
 
-def test_shafts_that_turn_with_the_firing_leave_nothing_known() -> None:
+def test_shafts_that_turn_with_the_firing_leave_no_common_bound() -> None:
     """Four cylinders fire twice a turn, as the shafts of the second order turn."""
     own = problem("inline", cylinders=4)
     (candidate, _), *_ = even_stars(own.phasing)
@@ -66,7 +66,7 @@ def test_shafts_that_turn_with_the_firing_leave_nothing_known() -> None:
     assert firing_bound(own, evaluate(realised)) == 0.0
 
 
-def test_shafts_that_the_design_leaves_out_or_cylinders_of_its_own_leave_nothing_known() -> None:
+def test_omitted_shafts_or_unlike_cylinders_leave_no_common_bound() -> None:
     """Another design may have these shafts; and the loads of unlike cylinders are not one load shifted."""
     own = problem("inline", cylinders=4)
     (candidate, _), *_ = even_stars(own.phasing)

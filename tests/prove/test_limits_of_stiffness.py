@@ -49,7 +49,7 @@ def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
     assert all(violation(pair) < 0.0 for pair in ([0, 1], [0, 2], [1, 2]))
 
 
-def test_limits_that_are_kept_are_no_conflict_of_those_that_are_not(tmp_path: Path) -> None:
+def test_feasible_limits_are_no_part_of_a_conflict(tmp_path: Path) -> None:
     """A limit on forces that no search meets says nothing of sag, which all designs keep."""
     text = """
     [search]

@@ -174,7 +174,7 @@ def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
         assert np.all(line <= sag(search.model, low + share * (high - low)) * (1.0 + 1e-12))
 
 
-def test_a_box_whose_softest_corner_carries_nothing_has_a_line_under_its_sag(tmp_path: Path) -> None:
+def test_a_box_with_a_soft_corner_has_a_line_below_its_sag(tmp_path: Path) -> None:
     """No design of it is under the line, which is zero where the middle carries nothing either."""
     bottomless = changed(MOUNTS, *[('"20 N/mm", "4000 N/mm"', '"0 N/mm", "4000 N/mm"')] * 2)
     problem = stiffness_problem(tmp_path, 'minimise = "static sag"', mounts=bottomless)

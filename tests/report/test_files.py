@@ -166,7 +166,7 @@ def test_an_error_leaves_all_as_it_was(tmp_path: Path) -> None:
     ["{}", "[]", "", '{"made_by": "solve"}', "\0", "[" * 9999, '{"made_by": "solve", "files": 5}',
      '{"made_by": [1], "files": ["file-0"]}'],
 )  # fmt: skip
-def test_a_spoilt_note_owns_nothing(noted: str, tmp_path: Path) -> None:
+def test_a_damaged_note_owns_no_files(noted: str, tmp_path: Path) -> None:
     make(tmp_path / "set", "old")
     (tmp_path / "set" / MADE).write_text(noted)
     with pytest.raises(InputError, match="did not make"):
@@ -175,7 +175,7 @@ def test_a_spoilt_note_owns_nothing(noted: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("named", ['["gone"]', '["../other"]', "[1, null, [2]]", '["a\\u0000b", "/etc/hostname", "."]'])
-def test_a_note_of_what_is_not_there_brings_nothing(named: str, tmp_path: Path) -> None:
+def test_a_note_of_missing_files_copies_none(named: str, tmp_path: Path) -> None:
     """A file of results that a user took away stood in the way of the next run, and others were copied in."""
     (tmp_path / "other").write_text("mine")
     (tmp_path / "set").mkdir()

@@ -55,7 +55,7 @@ def test_a_limit_shows_its_price_in_user_units() -> None:
     assert re.search(r"-39\.\d %", text)
 
 
-def test_the_angle_of_nothing_is_a_dash() -> None:
+def test_the_angle_of_zero_is_a_dash() -> None:
     result = scenes.solved(scenes.TIGHT)
     size, angle = result.decisions[:2]
     rows = {row[0]: row for row in tables_of(replace(result, decisions=(replace(size, value=1e-9), angle)))[0].rows}

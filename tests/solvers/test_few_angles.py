@@ -69,7 +69,7 @@ def test_few_angles_forbid_what_the_cycle_allows() -> None:
     assert fine.objective(x) < 1071.7
 
 
-def test_a_limit_that_can_be_kept_is_not_named_as_one_that_cannot() -> None:
+def test_a_feasible_limit_is_not_named_as_a_conflict() -> None:
     result = laufruhe.solve(single(IMPOSSIBLE, QUIET))
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("impossible",)
@@ -184,7 +184,7 @@ def test_stars_are_not_excluded_by_means_at_the_few_angles_of_a_program() -> Non
     assert solve(load_tables(tables, Path("five.toml"))).status is not Status.INFEASIBLE
 
 
-def test_a_limit_that_nothing_open_moves_is_read_at_many_angles() -> None:
+def test_a_constant_limit_is_read_at_many_angles() -> None:
     """Check a limit on shaking force, of which 48 angles read a quarter of a percent too much."""
     tables = {
         **SINGLE, **mounted(), "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [],
@@ -210,7 +210,7 @@ def test_a_star_is_excluded_by_what_the_cycle_has(maximum: str, excluded: bool) 
     assert design.is_infeasible is excluded
 
 
-def test_a_design_is_not_broken_by_what_few_angles_read_of_a_limit_that_it_cannot_move() -> None:
+def test_few_angles_break_no_constant_limit() -> None:
     """Shafts at the speed of the crank beside a limit on the second order, which 96 angles have too much of."""
     limits = [{"limit": "mean shaking force", "orders": [2], "max": "964.64 N"}]
     tables = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [2]}, "constraints": limits}

@@ -103,7 +103,7 @@ def test_the_least_inertia_has_its_degree_and_is_shown_from_both_sides(tmp_path:
 
 
 @pytest.mark.slow
-def test_permitted_degrees_of_the_textbook_need_inertias_in_inverse_proportion(tmp_path: Path) -> None:
+def test_inertia_is_inverse_to_the_permitted_degree(tmp_path: Path) -> None:
     """Check the textbook's table (2.7) and eq. 25, E = J w^2 delta, for small delta."""
     page = (PROBLEMS.parent / "docs/how-to/flywheel.md").read_text(encoding="utf-8")
     degrees = re.findall(r"^\| .* \| `(1/\d+)` \|$", page, re.MULTILINE)
@@ -205,7 +205,7 @@ def test_a_flywheel_too_small_for_the_degree_is_infeasible(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_the_worked_diesel_gets_the_flywheel_that_it_was_given(diesel: laufruhe.solvers.Result) -> None:
+def test_the_worked_diesel_gets_its_printed_flywheel(diesel: laufruhe.solvers.Result) -> None:
     """Check a 70 hp diesel, part E: 1:60, rim of 300 by 195 mm, 4850 kg of 6330 kg."""
     assert diesel.certificate is not None
     assert diesel.certificate.kind is Proof.GLOBAL

@@ -112,7 +112,7 @@ EDGES = {
 
 @pytest.mark.parametrize("measure", [f"{norm} {load}" for norm, load in zip(NORMS, (*LOADS, *LOADS), strict=False)])
 @pytest.mark.parametrize("case", EDGES)
-def test_problems_with_hardly_anything_in_them(case: str, measure: str, tmp_path: Path) -> None:
+def test_minimal_problems(case: str, measure: str, tmp_path: Path) -> None:
     """A design with its bound, no worse than the one given; under a limit of nothing, the same or that limit named."""
     mass, count, weights = EDGES[case]
     text = ENGINE.format(mass=mass, throws=[97 * k % 360 for k in range(count)], measure=measure)

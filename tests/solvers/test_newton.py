@@ -207,7 +207,7 @@ def test_loads_that_cancel(name: str) -> None:
     assert problem.objective(solution.x) <= 1e-12 * problem.objective(np.zeros(problem.size))
 
 
-def test_a_mass_in_the_objective_where_nothing_is_to_be_gained() -> None:
+def test_a_mass_in_the_objective_beside_loads_that_no_weight_reduces() -> None:
     """Check a mass in the objective beside forces of order 3, which no weight reduces."""
     angle = 2.0 * np.pi * np.arange(ROWS) / ROWS
     constant = np.stack([np.cos(3.0 * angle), np.sin(3.0 * angle)], axis=1)

@@ -222,7 +222,7 @@ def test_dependent_variables_distinguish_no_optima():
     assert same[0].value == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_search_ends_when_nothing_better_is_to_be_expected():
+def test_a_search_ends_by_the_rule_of_boender_and_rinnooy_kan():
     """Check the rule of Boender and Rinnooy Kan: seven starts for one optimum, more for several."""
     x = ca.SX.sym("x", 1)
     bowl = NonlinearProgram(x, (x[0] - 0.3) ** 2, np.array([-4.0]), np.array([4.0]))

@@ -190,7 +190,7 @@ def test_an_engine_that_cannot_turn_is_left_out_and_not_built(tmp_path: Path) ->
     assert result.objective.value <= searched(problem.fix("engine.rod_length")).objective.value * (1.0 + 1e-6)
 
 
-def test_a_bound_of_what_is_given_twice_is_one_line(tmp_path: Path) -> None:
+def test_a_bound_of_a_number_given_twice_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="rod_ratio"):
         loaded(
             tmp_path,

@@ -310,7 +310,7 @@ def test_bounds_far_from_the_answer(magnitude: float) -> None:
     assert result.objective.value <= result.objective.initial * (1.0 + 1e-6)
 
 
-def test_a_limit_that_nothing_open_acts_on_changes_nothing() -> None:
+def test_a_constant_limit_leaves_the_bound() -> None:
     """Check that a constant limit broken by a rounding is kept, and has no part in the bound."""
     roll = Measure(channels.ROLL_MOMENT, NORMS["peak to peak"], orders=(4.0, 6.0))
     free = solve(four())

@@ -240,7 +240,7 @@ orders = [1]
         loaded(tmp_path, changed(text, '{ x = "50 mm" }', '{ x = "50 mm", reciprocating_mass = "1 kg" }'))
 
 
-def test_nothing_else_changes_where_it_is_given(tmp_path: Path) -> None:
+def test_a_given_value_changes_no_other_number(tmp_path: Path) -> None:
     fixed = changed(VEE, '{ between = ["0.2 kg", "2 kg"] }', '"0.9 kg"')
     problem = loaded(tmp_path, fixed + objective("mean mount force"))
     opened = loaded(tmp_path, VEE + objective("mean mount force"))

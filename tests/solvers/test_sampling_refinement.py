@@ -59,7 +59,7 @@ def test_a_constant_limit_is_judged_at_many_angles() -> None:
     assert violated_limits(case.limits, with_fine_sampling(evaluate(case))) == ("second",)
 
 
-def test_a_program_in_which_nothing_is_open_is_its_own_answer() -> None:
+def test_a_program_without_open_numbers_is_its_own_solution() -> None:
     """Check the bound of a program without open numbers, as of a box of one point."""
     model = AffineModel(problem({}, objective={"minimise": "rms shaking force"})).at(48)
     result = solve_cones(model)

@@ -93,7 +93,7 @@ def closed(tmp_path: Path) -> Problem:
     return problem_of(tmp_path, yoke, BLOCK, mounts, objective)
 
 
-def test_nothing_open_on_elastic_mounts_is_evaluated(closed: Problem) -> None:
+def test_closed_problems_on_elastic_mounts_are_evaluated(closed: Problem) -> None:
     """The first order of a Scotch yoke is a force through the middle: one mass on one spring (eq. 40)."""
     result = solve(closed)
     assert result.status is Status.FEASIBLE

@@ -74,7 +74,7 @@ OPEN = {
 
 @pytest.mark.parametrize("attainable", [True, False])
 @pytest.mark.parametrize("what", OPEN)
-def test_limits_that_nothing_open_acts_on(what: str, attainable: bool, tmp_path: Path) -> None:
+def test_limits_without_open_numbers(what: str, attainable: bool, tmp_path: Path) -> None:
     """Check that kept limits are in the result, and that broken ones are named."""
     acts_on_sag = what == "stiffness"
     broken = "rms shaking force" if acts_on_sag else "static sag"
@@ -93,7 +93,7 @@ def test_limits_that_nothing_open_acts_on(what: str, attainable: bool, tmp_path:
 
 
 @pytest.mark.parametrize("minimum", ["1 N", "3500 N"])
-def test_limits_that_unbalances_cannot_keep_whatever_the_mounts(minimum: str, tmp_path: Path) -> None:
+def test_limits_that_no_unbalance_keeps_on_any_mounts(minimum: str, tmp_path: Path) -> None:
     """Check that a limit on the shaking force, which mounts do not change, is infeasible at 1 N."""
     tables = {**OPEN["stiffness"], "throws": [0, 0], "more": WEB}
     result = solve(loaded(tmp_path, BLOCK.format(sag="5 mm", force=minimum, **tables)))
@@ -104,7 +104,7 @@ def test_limits_that_unbalances_cannot_keep_whatever_the_mounts(minimum: str, tm
         assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
 
 
-def test_a_design_worse_than_the_one_given_is_not_proposed() -> None:
+def test_no_design_worse_than_the_initial_one_is_returned() -> None:
     """Check that the initial design replaces a worse proposal, with the proven bound."""
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     given = evaluate(problem)

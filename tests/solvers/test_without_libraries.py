@@ -19,7 +19,7 @@ print(laufruhe.solve(sys.argv[1]).status)
 
 
 @pytest.mark.slow
-def test_counterweights_and_shafts_are_decided_with_no_library_but_the_solver_of_cones() -> None:
+def test_counterweights_and_shafts_need_only_the_cone_solver() -> None:
     """Check that a solve imports no heavy library except the cone solver."""
     path = str(PROBLEMS / "tractor-four-lanchester.toml")
     process = subprocess.run([sys.executable, "-c", QUICK, path], check=True, capture_output=True, text=True)

@@ -35,7 +35,7 @@ def test_scripts_can_be_imported_and_too_small_studies_are_refused():
 
 
 @pytest.mark.slow
-def test_one_after_the_other_whatever_becomes_of_them(tmp_path: Path):
+def test_all_benchmarks_run_after_failures(tmp_path: Path):
     """Check that a benchmark that fails or exceeds its time is named, and that those after it run."""
     for name, (text, _) in SHORT.items():
         (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")

@@ -57,7 +57,7 @@ def test_killed_clients_workers_and_schedulers_change_no_bit(
     assert clusters.pieces_done(folder) == 4 + 10
 
 
-def test_an_address_where_nobody_answers_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_address_without_an_answer_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = clusters.prepared(tmp_path, **SMALL)
     monkeypatch.chdir(folder)
     answer = CliRunner().invoke(app, ["study", "s.toml", "--out", "out", "--scheduler", "nowhere"])

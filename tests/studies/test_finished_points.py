@@ -47,7 +47,7 @@ def trusted(path: Path) -> list[int]:
         return sorted(map(MARKS.index, store.seconds))
 
 
-def test_points_are_read_as_they_were_kept(tmp_path: Path) -> None:
+def test_points_are_read_as_written(tmp_path: Path) -> None:
     written(tmp_path / FINISHED_POINTS)
     assert trusted(tmp_path / FINISHED_POINTS) == [0, 1, 2, 3, 4]
     with FinishedPoints(tmp_path / FINISHED_POINTS, MARKS[1:3]) as store:

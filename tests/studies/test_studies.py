@@ -171,7 +171,7 @@ def test_groups_follow_decisions() -> None:
     assert len(shaft_groups(fixed)) == 4
 
 
-def test_nothing_open_is_not_called_an_optimum(tmp_path: Path) -> None:
+def test_a_result_without_open_numbers_is_no_optimum(tmp_path: Path) -> None:
     path = study(tmp_path, part("layout comparison", ["boxer-four", "vee-six-90"]))
     shutil.copy(PROBLEMS / "boxer-four.toml", tmp_path)
     shutil.copy(PROBLEMS / "vee-six-90.toml", tmp_path)

@@ -208,7 +208,7 @@ LOW = mounts_of({"position": ["200 mm", "250 mm", {"between": ["-50 mm", "50 mm"
 
 
 @pytest.mark.slow
-def test_the_nearest_design_is_kept_where_none_is_found() -> None:
+def test_the_nearest_design_is_reported_without_a_feasible_one() -> None:
     """Check travel on mounts of open place, where no proof is claimed."""
     limits = [limit("maximum mount travel", max="1 mm"), limit("static sag", max="2 mm")]
     problem = problem_of(limits, block=BLOCK, counterweights=None, mounts=LOW, objective=FORCE,
@@ -270,7 +270,7 @@ def test_a_failed_search_is_infeasible_by_its_bound() -> None:
     assert result.decisions == ()
 
 
-def test_nothing_is_looked_at_when_time_is_over() -> None:
+def test_a_search_out_of_time_evaluates_no_design() -> None:
     result = result_with_reach(SCENES["vee"], Status.INFEASIBLE, 1e-9)
     assert [each.why for each in result.reached] == [LONG]
     assert all(math.isnan(each.value) for each in result.reached)
@@ -286,7 +286,7 @@ class Clock:
         return self.now
 
 
-def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a_search(
+def test_every_limit_has_its_share_of_the_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     problem, shares, clock = problem_of([LIGHT, QUIET | {"max": "1.6 kN"}]), [], Clock()
@@ -324,7 +324,7 @@ def test_a_limit_without_open_numbers_keeps_its_value() -> None:
     assert "needed" not in explained(result)
 
 
-def test_a_design_that_breaks_a_limit_proves_nothing() -> None:
+def test_an_infeasible_design_gives_no_proof() -> None:
     problem = SCENES["vee"]
     design = evaluate_design(problem, problem.start)
     shown = ProofData(0.9 * design.value, ProofStrength.EXACT, 0.0, "a bound")

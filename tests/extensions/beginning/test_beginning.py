@@ -250,7 +250,7 @@ def test_an_unwritable_path_is_refused_before_questions(here: Path, words: list[
 
 
 @pytest.mark.parametrize("words", [["init", "a/b/mine.toml", "--from", "bmw-b48"], ["examples", "tractor-sweeps"]])
-def test_a_full_disk_leaves_nothing_half_written(here: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]) -> None:
+def test_a_full_disk_leaves_no_partial_files(here: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]) -> None:
     write = files.write
 
     def full(path: Path, text: str) -> None:

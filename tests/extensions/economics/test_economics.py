@@ -154,7 +154,7 @@ def test_each_reading_of_the_force_is_least_for_the_designs_that_it_decides(four
     assert ["alternating part [N]" in heads[0], "with its static part [N]" in heads[1]] == [True, True]
 
 
-def test_efficient_points_are_those_that_nothing_beats(four: xr.Dataset) -> None:
+def test_efficient_points_are_not_dominated(four: xr.Dataset) -> None:
     """Compare with the definition: no other point is better in force, mass or shafts and no worse in all."""
     own = four.where(four["standing"] != MORE_CYLINDERS, drop=True)
     points = [

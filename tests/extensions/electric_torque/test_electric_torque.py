@@ -172,7 +172,7 @@ def test_copper_loss_and_current_limit_the_torque() -> None:
         ({}, "rms roll moment", False),
     ],
 )
-def test_a_machine_that_moves_nothing_measured_is_named(keys: dict[str, Any], minimise: str, is_idle: bool) -> None:
+def test_a_machine_without_effect_on_any_measure_is_named(keys: dict[str, Any], minimise: str, is_idle: bool) -> None:
     result = laufruhe.evaluate(problem_of([machine(**keys)], minimise))
     (table,) = SECTION.tables(result)
     assert ("isg acts on nothing that is minimised or limited" in table.note) is is_idle
@@ -359,7 +359,7 @@ def test_half_orders_belong_to_four_stroke_engines() -> None:
         ("engine", "20 N m", ""),
     ],
 )
-def test_a_mean_torque_that_nothing_balances_is_doubted(text: str, mean: str, words: str) -> None:
+def test_an_unbalanced_mean_torque_is_reported(text: str, mean: str, words: str) -> None:
     """Check warnings about mean torques of machines on an engine and on a compressor."""
     machines = [{"name": "motor", "mean_torque": mean}]
     if text == "engine":

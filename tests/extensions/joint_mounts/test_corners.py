@@ -72,7 +72,7 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
     assert lower_bound(tight, multipliers).value > 1.99 * tight.objective(x) > 0.0
 
 
-def test_a_corner_is_proven_as_closely_whatever_the_weights() -> None:
+def test_a_corner_is_proven_as_closely_for_any_weights() -> None:
     problem = joint(780017)
     ((_, mounts),) = boxes_of(problem, np.random.default_rng(1), 1, 0.5)
     given, gaps = MountedLoads(problem).at(mounts), []

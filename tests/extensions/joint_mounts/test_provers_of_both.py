@@ -39,7 +39,7 @@ def test_one_number_is_proven(name: str) -> None:
     assert result.objective.value <= minimum * (1.0 + 1e-6)
 
 
-def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_boxes_without_progress_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
     monkeypatch.setattr(prover, "load_bounds", lambda *_: iter([BoxResult(0.5, 1), BoxResult(0.6, 9)]))
     for known, boxes in ((0.4, 9), (0.7, 1)):

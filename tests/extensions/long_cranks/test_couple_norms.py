@@ -86,7 +86,7 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
 
 
 @pytest.mark.parametrize(("cylinders", "cycle", "gas"), [(7, "two-stroke", True), (9, "four-stroke", False)])
-def test_a_star_that_is_turned_is_worth_the_same(cylinders, cycle, gas, tmp_path):
+def test_a_rotated_star_has_the_same_value(cylinders, cycle, gas, tmp_path):
     problem, family = problem_of_norm(tmp_path, cylinders, cycle, "rms", gas)
     own, r = norms_of(problem, family), np.random.default_rng(4)
     stars = np.array([[0, *r.permutation(family.first[1:])] for _ in range(20)], dtype=np.uint8)

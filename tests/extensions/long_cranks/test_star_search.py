@@ -198,7 +198,7 @@ def test_enumeration_looks_at_more_stars_in_more_time(monkeypatch):
     assert nodes[0].nodes < nodes[1].nodes < nodes[2].nodes < nodes[3].nodes
 
 
-def test_cranks_with_halves_too_long_to_list_are_rearranged_while_time_is_left(monkeypatch):
+def test_long_cranks_are_rearranged_while_time_is_left(monkeypatch):
     """Check that more time gives no worse star, with the bound of all stars."""
     monkeypatch.setattr(star_search, "LONGEST_HALF", 5)
     monkeypatch.setattr(star_search, "REARRANGED", (4, 6))
@@ -224,7 +224,7 @@ def test_a_search_out_of_time_claims_no_proof():
 
 
 @pytest.mark.parametrize("name", OBJECTIVES)
-def test_in_pieces_it_finds_the_same_whoever_works(name, monkeypatch):
+def test_pieces_give_the_same_result_on_any_workers(name, monkeypatch):
     """Check equal bits on one worker and on three, and the proven best star."""
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
     monkeypatch.setattr(star_search, "PIECES", 5)
@@ -263,7 +263,7 @@ def test_long_cranks_without_couples_need_no_search(throws, name):
 
 
 @pytest.mark.parametrize("throws", [6, 14, 48])
-def test_a_search_that_nothing_is_left_of_ends(throws):
+def test_a_search_ends_when_all_stars_are_equal(throws):
     """Check forces alone, which even pairs cancel, so that all stars are equal."""
     forces = StarAmplitudes((1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)),))
     result = search_stars(in_pairs(throws), forces, 1, time_limit=10.0)

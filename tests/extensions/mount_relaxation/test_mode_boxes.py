@@ -87,7 +87,7 @@ def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[
 NEAR = np.array([90e3, 40e3, 110e3, 60e3])
 
 
-def test_sides_hold_whatever_a_solver_proposes() -> None:
+def test_sides_hold_for_any_multipliers_of_a_solver() -> None:
     """Check least s and least w of all better designs, with random multipliers too."""
     problem, generator = decoupled(4), np.random.default_rng(11)
     designs = designs_about(problem, NEAR, 12)

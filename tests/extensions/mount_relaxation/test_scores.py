@@ -71,7 +71,7 @@ min = "1.5 Hz"
 """
 
 
-def test_a_half_of_the_motions_may_have_nothing_open() -> None:
+def test_one_half_of_the_motions_may_have_no_open_springs() -> None:
     """Check a half of upright motions with given stiffness alone."""
     problem = load(tomllib.loads(SIDEWAYS))
     result, given = solve(problem), evaluate(problem)

@@ -277,9 +277,7 @@ OWN = 'damping = ["900 N s/m", "900 N s/m", "500 N s/m"]\n'
     [(OWN, True), (OWN.replace('"500 N s/m"', '{ between = ["300 N s/m", "500 N s/m"] }'), False)],
     ids=["given", "open"],
 )
-def test_dampers_of_mounts_that_turn_or_move_are_followed_where_they_are_given(
-    springs: str, follows: bool, tmp_path: Path
-) -> None:
+def test_given_dampers_of_turned_and_moved_mounts_are_bounded(springs: str, follows: bool, tmp_path: Path) -> None:
     """Check E66 with given dampers."""
     text = POWERTRAIN.with_name("tractor-four-elastic.toml").read_text(encoding="utf-8")
     own = ("turned    = [", f"{springs}turned    = ["), ('name = "rear left"', f'name = "rear left"\n{OWN}')
@@ -407,7 +405,9 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
 
 
 @pytest.mark.parametrize("name", ["rms", pytest.param("means", marks=pytest.mark.slow)])
-def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bound_holds_for_any_multipliers_of_a_solver(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Check bounds from random multipliers, and from none."""
     problem = stiffness_problem(
         tmp_path, OBJECTIVES.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED
@@ -490,7 +490,7 @@ def test_no_force_of_a_high_order_exceeds_its_line() -> None:
 
 
 @pytest.mark.parametrize("norm", ["rms", "mean"])
-def test_orders_that_nothing_excites_have_no_bound(norm: str, tmp_path: Path) -> None:
+def test_orders_without_load_have_no_bound(norm: str, tmp_path: Path) -> None:
     """Check that orders without load have no bound alone, and add nothing to others."""
     silent = f'minimise = "{norm} mount force"\norders = [3]\noperating_points = ["idle"]'
     problem = stiffness_problem(tmp_path, silent)

@@ -127,7 +127,7 @@ READY = ("twin-parallel-180", "tractor-three-bearings")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", READY)
-def test_with_a_free_decision_held_the_optimum_is_as_good(name: str) -> None:
+def test_the_optimum_is_as_good_with_a_free_decision_fixed(name: str) -> None:
     """Check that the optimum stays as good with a free decision held at both ends and between."""
     problem = load(PROBLEMS / f"{name}.toml")
     result = laufruhe.solve(problem)
@@ -175,7 +175,7 @@ def test_prices_within_the_accuracy_are_none() -> None:
         assert decision.shadow_price == (pytest.approx(slope * scale) if priced else 0.0)
 
 
-def test_an_angle_of_nothing_is_not_shown() -> None:
+def test_the_angle_of_a_zero_unbalance_is_not_shown() -> None:
     result = solve(problem_of("rms mount force", [web("web") | {"angle": {"between": [0, 360]}}], {"orders": [2]}))
     assert [decision.name for decision in relevant_decisions(result.decisions)] == ["web.mass"]
     assert "web.angle" not in repr(result)

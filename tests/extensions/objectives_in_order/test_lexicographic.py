@@ -159,7 +159,7 @@ def test_a_rank_without_a_proof_has_no_bound(tmp_path: Path) -> None:
         assert rank.gap == np.inf
 
 
-def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None:
+def test_the_second_objective_may_cost_a_share_of_the_first(tmp_path: Path) -> None:
     """Compare the least mass within 2 % of the least force with a scan of 4001 masses."""
     result = solve(loaded(tmp_path, changed(TWO, 'shaking force"\n', 'shaking force"\nwithin = 0.02\n')))
     masses = np.linspace(0.0, 8.0, 4001)

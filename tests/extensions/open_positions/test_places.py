@@ -101,7 +101,7 @@ def _searched(problem: Problem, seed: int, samples: int | None, starts: int = 6,
 
 class TestAgainstClosedForms:
     @pytest.mark.parametrize("reach", [200.0, 60.0])
-    def test_a_given_shaft_goes_where_its_couple_cancels_another(self, reach: float, tmp_path: Path) -> None:
+    def test_a_shaft_moves_to_where_its_couple_cancels_another(self, reach: float, tmp_path: Path) -> None:
         """Check m r a = U b (eq. 8) of two opposite throws and the two weights of a shaft.
 
         Loads are affine in such places: one box proves the optimum, at b or at the nearest end.

@@ -44,7 +44,7 @@ def test_leads_alone_are_least_at_a_corner() -> None:
     assert bound == pytest.approx(min(np.array(ends) * half @ slopes for ends in itertools.product((-1, 1), repeat=2)))
 
 
-def test_nothing_is_known_of_long_arcs() -> None:
+def test_long_arcs_have_no_bound() -> None:
     assert (
         minimum_on_arcs(DOMAINS, RATIOS, np.array([3.0, 0.1]), np.ones(3), np.ones(2), np.zeros((2, 2, 3))) == -np.inf
     )

@@ -70,7 +70,7 @@ def test_rods_turn_against_each_other() -> None:
 
 
 @given(st.floats(0.2, 3.0), st.floats(0.01, 0.03), st.floats(0.002, 0.045), st.floats(-1e-3, 1e-3), st.floats(0.0, 1.0))
-def test_equal_masses_and_a_weight_on_each_crank_leave_nothing(
+def test_equal_masses_and_weights_on_both_cranks_leave_no_load(
     mass: float, radius: float, offset: float, deficit: float, turning: float
 ) -> None:
     """Meijer 1959: piston and displacer of one mass move their centre as the crank pins, whatever the rods."""

@@ -90,7 +90,7 @@ def test_the_error_estimate_is_that_of_the_worst_engine() -> None:
 
 
 @pytest.mark.parametrize("rod_ratio", [0.3, "0.3 ± 3 %"], ids=["every error", "drawn"])
-def test_nothing_open_that_breaks_a_limit_in_some_engine_is_infeasible(rod_ratio: float | str) -> None:
+def test_a_closed_problem_that_breaks_a_limit_in_some_engine_is_infeasible(rod_ratio: float | str) -> None:
     """Check that the attainable value is that of the worst engine, while the drawing keeps the limit."""
     tables = {"engine": {**ENGINE, "rod_ratio": rod_ratio}, "robust": {"over": "worst case", "engines": 20}}
     free = problem(**tables, objective=SECOND)
@@ -107,7 +107,7 @@ def test_nothing_open_that_breaks_a_limit_in_some_engine_is_infeasible(rod_ratio
 
 
 @pytest.mark.parametrize("over", ["worst case", "90 %"])
-def test_a_drawing_with_nothing_open_that_breaks_a_limit_is_infeasible(over: str) -> None:
+def test_a_closed_drawing_that_breaks_a_limit_is_infeasible(over: str) -> None:
     limit = {"limit": "added mass", "max": "1 kg", "name": "light"}
     tables = {"objective": SECOND, "constraints": [limit], "robust": {"over": over, "engines": 20}}
     weight = {"name": "w", "x": "0 mm", "angle": 180, "radius": "50 mm", "mass": "2 kg"}
@@ -117,7 +117,7 @@ def test_a_drawing_with_nothing_open_that_breaks_a_limit_is_infeasible(over: str
 
 @pytest.mark.parametrize(("share", "status"), [(1.0005, Status.OPTIMAL), (0.998, Status.INFEASIBLE)])
 @pytest.mark.parametrize("throw", [0, 3])
-def test_few_angles_neither_break_nor_keep_a_limit_with_nothing_open(throw: int, share: float, status: Status) -> None:
+def test_few_angles_decide_no_limit_without_open_numbers(throw: int, share: float, status: Status) -> None:
     engine = {**ENGINE, "throws": [throw]}
     worst = heaviest(problem(engine=engine, objective=SECOND))
     limit = {**QUIET, "max": f"{share * worst!r} N"}
@@ -127,7 +127,7 @@ def test_few_angles_neither_break_nor_keep_a_limit_with_nothing_open(throw: int,
         assert result.limits[0].value <= result.limits[0].limit * (1.0 + FEASIBILITY_TOL)
 
 
-def test_built_engines_of_the_design_as_given_may_pass_a_limit_by_a_hair() -> None:
+def test_built_engines_of_the_initial_design_may_break_a_limit_slightly() -> None:
     """Check that a limit that built engines of the initial design break by a hair leaves no design."""
     case = problem(
         **{

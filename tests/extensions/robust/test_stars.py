@@ -26,7 +26,7 @@ def test_the_worst_case_of_every_crank_is_that_of_the_best() -> None:
 
 
 @pytest.mark.parametrize("found", [None, SimpleNamespace(value=3.0)])
-def test_open_cranks_keep_what_is_known_of_the_design_as_given(found: object, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_open_cranks_keep_the_initial_values(found: object, monkeypatch: pytest.MonkeyPatch) -> None:
     """Check that the result of the stars stays as it is without an objective of its own or of the initial design."""
     problem = laufruhe.load(changed(FOUR, '"0.5 kg"', '"0.5 kg ± 5 %"') + "[robust]\nengines = 20\n")
     result = SimpleNamespace(objective=found)

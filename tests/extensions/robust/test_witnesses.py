@@ -90,7 +90,7 @@ def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_an_assembly_that_was_pruned_is_found_out(request: pytest.FixtureRequest) -> None:
+def test_a_wrongly_pruned_assembly_is_detected(request: pytest.FixtureRequest) -> None:
     # other tests share this result, so it is found before the search is broken
     best = solved("selective-assembly")
     request.getfixturevalue("pruned_assemblies")

@@ -31,7 +31,7 @@ def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
 
 
 @pytest.mark.slow
-def test_limits_of_nothing() -> None:
+def test_limits_of_zero() -> None:
     """Check prices of limits of zero: 1 N m of couple saves weight, and no price exists for a tighter limit."""
     result = solve(PROBLEMS / "rotary-four-open.toml")
     prices = {limit.name: limit.price for limit in result.limits}

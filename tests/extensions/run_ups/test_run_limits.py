@@ -134,7 +134,7 @@ def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
     assert result.status is Status.OPTIMAL
 
 
-def test_limits_of_run_ups_are_not_excluded_beside_what_few_angles_read() -> None:
+def test_few_angles_exclude_no_limits_of_run_ups() -> None:
     travel = {"name": "travel", "limit": "run-up travel", "max": "1 m"}
     problem = on_open_mounts(
         0, run_up={"up_to": "1500 rpm", "time": "0.2 s"}, objective={"minimise": "rms mount force"},

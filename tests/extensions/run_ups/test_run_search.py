@@ -136,7 +136,7 @@ def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result
 
 
 @pytest.mark.slow
-def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
+def test_run_up_peaks_and_slopes_are_those_of_the_exact_model() -> None:
     """Check run-up peaks and their slopes for damping, place and shaft against the exact run and differences."""
     opened = {
         "damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"},
@@ -240,7 +240,7 @@ def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
 
 
 @pytest.mark.slow
-def test_weights_beside_stops_that_none_meets_are_those_of_the_cones() -> None:
+def test_weights_beside_stops_out_of_reach_are_those_of_the_cones() -> None:
     """Check that stops beyond reach leave the optimum at that of the cone program."""
     shaft = tables_of(PROBLEMS / "soft-single-run-up.toml")["balancer_shafts"]
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}

@@ -93,7 +93,7 @@ def test_limits_that_no_slider_moves_stay_with_their_value():
     assert shown["maximum mount travel"].signal is not None
 
 
-def test_limits_that_are_not_followed_stand_with_the_value_of_the_design_decided():
+def test_unfollowed_limits_show_the_value_of_the_design():
     problem = load(PROBLEMS / "soft-single-run-up.toml")
     shown = {each.name: each for each in model_of(problem).measures}
     twist = shown["run-up twist"]
@@ -170,7 +170,7 @@ def test_a_norm_that_the_script_does_not_know_is_not_followed(every):
     }
 
 
-def test_a_channel_that_nobody_named_is_not_followed(every):
+def test_an_unknown_channel_is_not_followed(every):
     problem = every[0]
     (term,) = problem.objective
     stranger = replace(term.measure.load, name="resultant of the mounts")

@@ -143,7 +143,7 @@ def test_tokens_are_long_and_of_one_run(server: Server) -> None:
     assert len(server.guard.token) >= 43
 
 
-def test_nobody_beyond_this_machine_is_listened_to(server: Server) -> None:
+def test_requests_from_other_machines_are_refused(server: Server) -> None:
     assert server.socket.getsockname()[0] == "127.0.0.1"
 
 

@@ -275,7 +275,7 @@ def test_sizes_without_added_mass_agree_with_a_geometric_program() -> None:
     assert result.objective.value == pytest.approx(program.value, rel=3e-4)
 
 
-def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
+def test_infeasible_stress_limits_are_named(tmp_path: Path) -> None:
     text = changed(TEXT, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"')
     # the result states what the limit can reach
     result = laufruhe.solve(loaded(tmp_path, text).changed(tolerance=1e-2))

@@ -85,9 +85,7 @@ def test_at_its_sizes_the_cone_program_finds_the_same(solved: Result, problem: P
     assert point.bound == pytest.approx(solved.objective.value, rel=1e-5)
 
 
-def test_weights_beside_sizes_are_never_worse_and_neither_are_sizes_beside_weights(
-    solved: Result, problem: Problem
-) -> None:
+def test_weights_and_sizes_together_are_never_worse(solved: Result, problem: Problem) -> None:
     sizes = laufruhe.solve(laufruhe.load(FEWER).changed(tolerance=TOLERANCE))
     weights = solve_unbalances(held(problem, np.array([entry.value for entry in sizes.decisions])))
     for less in (weights, sizes):
@@ -230,7 +228,7 @@ def test_a_stress_itself_may_be_minimised() -> None:
     assert pin.at_bound
 
 
-def test_a_mean_that_nothing_meets_at_many_angles_is_named() -> None:
+def test_an_infeasible_limit_on_a_mean_is_named() -> None:
     """Check a limit on a mean that boxes at few angles do not exclude."""
     limit = '[[constraints]]\nname = "smooth"\nlimit = "mean shaking force"\nmax = "600 N"\n[fidelity]'
     text = changed(
