@@ -70,10 +70,10 @@ def test_the_optimum_without_a_limit_that_it_keeps_is_the_optimum() -> None:
 @pytest.mark.parametrize(("share", "kind"), [(1.01, Proof.GLOBAL), (0.99, Proof.WITHIN_GAP)])
 def test_stiffness_has_a_bound_under_a_limit_without_formulas(share: float, kind: Proof) -> None:
     """Check the bound of stiffness under a limit on motion frequencies just above or below the optimum's."""
-    own = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
-    free, measure = laufruhe.solve(own), Measure(CHANNELS["motion frequencies"])
+    variant = laufruhe.load({"title": "stiffness", **few_stiffnesses(1, 2)(np.random.default_rng(1))})
+    free, measure = laufruhe.solve(variant), Measure(CHANNELS["motion frequencies"])
     limit = Limit("roll", measure, maximum=share * max(free.final.values(measure)))
-    result = laufruhe.solve(own.changed(limits=(*own.limits, limit)))
+    result = laufruhe.solve(variant.changed(limits=(*variant.limits, limit)))
     assert free.certificate is not None
     assert result.certificate is not None
     assert result.objective is not None

@@ -23,10 +23,10 @@ def _sampling_errors(seed: int) -> tuple[float, float]:
     """Return the true and stated error of samples with all physics."""
     rng = random.Random(seed)
     problem = random_problem(rng)
-    own = replace(problem, fidelity=Fidelity(samples=rng.choice([48, 96, 360, 1440])))
-    evaluation, truth = evaluate(own), objective_value(problem, evaluate(finer(problem, 14401)))
-    value = objective_value(own, evaluation)
-    return abs(value - truth) / value if value else 0.0, objective_error(own, evaluation)
+    variant = replace(problem, fidelity=Fidelity(samples=rng.choice([48, 96, 360, 1440])))
+    evaluation, truth = evaluate(variant), objective_value(problem, evaluate(finer(problem, 14401)))
+    value = objective_value(variant, evaluation)
+    return abs(value - truth) / value if value else 0.0, objective_error(variant, evaluation)
 
 
 @pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 1, 2))

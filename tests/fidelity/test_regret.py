@@ -86,14 +86,14 @@ def test_omitted_loads_are_the_same_for_all_designs(path: Path) -> None:
     """Check that two random designs omit the same signal if the table of dependences says so."""
     problem = replace(laufruhe.load(path).balance, phasing=None)
     terms = [term.measure for term in problem.objective if term.measure.is_load]
-    own, whole = problem.at(Fidelity(samples=96, orders=2)), problem.at(Fidelity(samples=96))
+    variant, whole = problem.at(Fidelity(samples=96, orders=2)), problem.at(Fidelity(samples=96))
     for measure in terms if problem.decisions else ():
-        same = keeps_omitted(measure.channel, open_kinds(own), own)
-        assert same or open_kinds(own) != {Kind.UNBALANCE}
+        same = keeps_omitted(measure.channel, open_kinds(variant), variant)
+        assert same or open_kinds(variant) != {Kind.UNBALANCE}
         if not same:
             continue
-        designs = [own.design(list(values)) for values in random_decisions(own, 2)]
-        lacks = [_omitted(measure, whole, own, engine) for engine in designs]
+        designs = [variant.design(list(values)) for values in random_decisions(variant, 2)]
+        lacks = [_omitted(measure, whole, variant, engine) for engine in designs]
         scale = max(np.abs(lack).max() for lack in lacks)
         sizes = [np.abs(s.coefficients).max() for s in signals(measure, evaluate(whole, designs[0]))]
         assert np.abs(lacks[0] - lacks[1]).max() <= 1e-9 * max(scale, *sizes)

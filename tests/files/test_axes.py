@@ -70,16 +70,16 @@ def test_axes_of_a_file_are_turned_into_those_of_the_engine(case: str, rotation:
     rows, axes = CASES[case]
     # y of an engine that turns the other way points to the right
     rows = rows * np.array([[1.0], [1.0 if rotation == "clockwise" else -1.0], [1.0]])
-    own, other = problem(np.eye(3), None, rotation=rotation), problem(rows, axes, rotation=rotation)
-    for mine, carried in zip(own.engine.mounts, other.engine.mounts, strict=True):
+    variant, other = problem(np.eye(3), None, rotation=rotation), problem(rows, axes, rotation=rotation)
+    for mine, carried in zip(variant.engine.mounts, other.engine.mounts, strict=True):
         assert np.allclose(carried.position, mine.position, rtol=0, atol=1e-12)
         for matrix in ("stiffness_matrix", "loss_matrix"):
             expected = getattr(mine, matrix)
             assert np.abs(getattr(carried, matrix) - expected).max() < 1e-12 * np.abs(expected).max()
-    assert own.engine.block is not None
+    assert variant.engine.block is not None
     assert other.engine.block is not None
-    assert np.allclose(other.engine.block.mass_matrix, own.engine.block.mass_matrix, rtol=0, atol=1e-10)
-    forces = [channel_samples(evaluate(one), 0) for one in (own, other)]
+    assert np.allclose(other.engine.block.mass_matrix, variant.engine.block.mass_matrix, rtol=0, atol=1e-10)
+    forces = [channel_samples(evaluate(one), 0) for one in (variant, other)]
     assert np.abs(forces[1] - forces[0]).max() < 1e-11 * np.abs(forces[0]).max()
     assert any("axes of its own" in text for text in other.assumptions)
 

@@ -127,8 +127,8 @@ def test_throws_take_values_by_the_names_that_results_show() -> None:
     assert again.objective.value == pytest.approx(result.objective.value, rel=1e-9)
     with pytest.raises(InputError, match="give values for all throws"):
         problem.with_values({"throw 2": "40 deg"})
-    given = laufruhe.load(LANCHESTER).with_values({"throw 2": "170 deg"})
-    assert given.engine.slider_cranks[1].throw == pytest.approx(math.radians(170))
+    variant = laufruhe.load(LANCHESTER).with_values({"throw 2": "170 deg"})
+    assert variant.engine.slider_cranks[1].throw == pytest.approx(math.radians(170))
 
 
 def test_shafts_that_a_star_leaves_out_are_left_out() -> None:

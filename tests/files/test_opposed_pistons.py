@@ -122,5 +122,5 @@ def test_slider_cranks_on_one_throw_share_its_rotating_mass(tmp_path: Path) -> N
     problem = load(written(tmp_path, TWIN))
     assert [part.rotating_mass for part in problem.engine.slider_cranks] == [0.5, 0.5, 1.0]
     assert objective_value(problem, evaluate(problem)) == pytest.approx(0.0, abs=1e-9)
-    own = load(written(tmp_path, TWIN.replace("bank_angle = 45", 'bank_angle = 45\nrotating_mass = "0.2 kg"')))
-    assert [part.rotating_mass for part in own.engine.slider_cranks] == [0.2, 1.0, 1.0]
+    variant = load(written(tmp_path, TWIN.replace("bank_angle = 45", 'bank_angle = 45\nrotating_mass = "0.2 kg"')))
+    assert [part.rotating_mass for part in variant.engine.slider_cranks] == [0.2, 1.0, 1.0]

@@ -299,9 +299,9 @@ def place_of(problem: Problem, result: Result) -> np.ndarray | None:
 def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
     """Return the claims of a solve that are wrong; none if all hold."""
     result = solve(problem)
-    given = _given(problem)
+    initial = _given(problem)
     out = []
-    met = given is not None and given.violation(problem.limits) <= 0.0
+    met = initial is not None and initial.violation(problem.limits) <= 0.0
     if met and result.status in (Status.INFEASIBLE, Status.FAILED):
         out.append(f"{result.status}, and the design as given keeps all limits")
     actual = searched(problem, result, seed, budget)
@@ -316,8 +316,8 @@ def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
     if result.objective is None or result.certificate is None:
         return out
     value, bound = result.objective.value, result.certificate.lower_bound
-    if met and given is not None and value > objective_value(problem, given) * (1.0 + 1e-9):
-        out.append(f"worse than the design as given: {value} > {objective_value(problem, given)}")
+    if met and initial is not None and value > objective_value(problem, initial) * (1.0 + 1e-9):
+        out.append(f"worse than the design as given: {value} > {objective_value(problem, initial)}")
     if actual.value < bound * (1.0 - 1e-9):
         out.append(f"false bound: {bound}, {actual.value} is reached")
     if result.status is Status.OPTIMAL and actual.value < value * (1.0 - 1.5e-4):

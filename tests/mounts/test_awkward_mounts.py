@@ -116,12 +116,12 @@ def test_a_failed_cone_solve_finds_the_least_excess(tmp_path: Path) -> None:
     result = solve(problem)
     assert result.status == "infeasible"
     assert result.conflict == ("natural frequencies", "torque-roll residual")
-    given = evaluate(problem)
+    initial = evaluate(problem)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
 
     def violation(share):
         x = low + np.clip(share, 0.0, 1.0) * (high - low)
-        return with_mounts(given, problem.design(x.tolist())).violation(problem.limits)
+        return with_mounts(initial, problem.design(x.tolist())).violation(problem.limits)
 
     actual = minimize(violation, np.full(len(low), 0.2), method="Nelder-Mead", options={"maxfev": 600})
     assert actual.fun > 1e-4
@@ -190,9 +190,9 @@ def test_one_number_on_a_limit_is_proven_by_a_few_boxes(tmp_path: Path) -> None:
     boxes = re.search(r"bounds of mounts from (\d+) box", result.certificate.method)
     assert boxes is not None
     assert int(boxes[1]) < 200
-    given, (stiffness,) = evaluate(problem), problem.mount_decisions
+    initial, (stiffness,) = evaluate(problem), problem.mount_decisions
     designs = [
-        with_mounts(given, problem.design([float(k)])) for k in np.linspace(stiffness.lower, stiffness.upper, 100)
+        with_mounts(initial, problem.design([float(k)])) for k in np.linspace(stiffness.lower, stiffness.upper, 100)
     ]
     allowed = [objective_value(problem, each) for each in designs if each.violation(problem.limits) <= 0.0]
     assert result.certificate.lower_bound <= result.objective.value <= min(allowed)

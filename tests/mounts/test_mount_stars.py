@@ -225,19 +225,19 @@ def test_no_star_near_an_uneven_one_is_better(uneven):
     for _ in range(400):
         size = 10.0 ** generator.uniform(-4, -1.5)
         throws = tuple(t + (size * generator.normal() if k else 0.0) for k, t in enumerate(candidate.throws))
-        own = replace(phasing.problem_of(replace(candidate, throws=throws)), phasing=None)
+        star_problem = replace(phasing.problem_of(replace(candidate, throws=throws)), phasing=None)
         mounts = [
             float(np.clip(values[d.name] * (1 + size * generator.normal()), d.lower, d.upper))
-            for d in own.mount_decisions
+            for d in star_problem.mount_decisions
         ]
         fraction = float(np.clip(values["web.balance_factor"] + size * generator.normal(), 0.0, 1.0))
-        near = evaluate(own, own.design([fraction, *mounts]), 96)
+        near = evaluate(star_problem, star_problem.design([fraction, *mounts]), 96)
         if not phasing.intervals.holds(near.engine.firing_intervals, 1e-9):
             continue
-        if max(near.check_limit(limit).violation for limit in own.mount_limits) > 0.0:
+        if max(near.check_limit(limit).violation for limit in star_problem.mount_limits) > 0.0:
             continue
         tried += 1
-        assert objective_value(own, near) > uneven.objective.value * (1 - 1e-5)
+        assert objective_value(star_problem, near) > uneven.objective.value * (1 - 1e-5)
     assert tried > 20
 
 
@@ -253,14 +253,14 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
     problem = problem_of(tmp_path, *parts(objective=objective), UNEVEN)
     phasing = problem.phasing
     star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
-    own = replace(phasing.problem_of(star), phasing=None)
+    star_problem = replace(phasing.problem_of(star), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
-    joint = SmoothProgram(own, 100.0, moves=moves)
+    joint = SmoothProgram(star_problem, 100.0, moves=moves)
     value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])
     generator = np.random.default_rng(5)
     for _ in range(3):
         turns = generator.uniform(-0.07, 0.07, moves.size)
-        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
+        mounts = [generator.uniform(d.lower, d.upper) for d in star_problem.mount_decisions]
         x = joint.start(mounts, generator.uniform(0.0, 1.0, 1), turns)
         moved = joint.problem_at(x)
         given, unbalances = joint.decision_values(x)
@@ -279,14 +279,14 @@ def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tm
     engine = changed(engine, ("[[operating_points]]", 'bore = "85 mm"\n[[operating_points]]'))
     phasing = problem_of(tmp_path, engine, *rest, gas, UNEVEN).phasing
     star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
-    own = replace(phasing.problem_of(star), phasing=None)
+    star_problem = replace(phasing.problem_of(star), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
-    joint = SmoothProgram(own, 100.0, moves=moves)
+    joint = SmoothProgram(star_problem, 100.0, moves=moves)
     value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])
     generator = np.random.default_rng(6)
     for _ in range(2):
         turns = generator.uniform(-0.07, 0.07, moves.size)
-        mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
+        mounts = [generator.uniform(d.lower, d.upper) for d in star_problem.mount_decisions]
         x = joint.start(mounts, np.array([0.5]), turns)
         moved = joint.problem_at(x)
         given, unbalances = joint.decision_values(x)

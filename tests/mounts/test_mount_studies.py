@@ -64,13 +64,13 @@ def test_sag_over_the_highest_frequency_is_what_solve_finds(tmp_path: Path) -> N
     assert data.attrs["metric"] == "static sag"
     assert data["objective"].attrs["units"] == "m"
     assert set(data["proof"].values) == {"global"}
-    given = evaluate_only(load(tmp_path / "soft.toml")).objective
-    assert given is not None
+    initial = evaluate_only(load(tmp_path / "soft.toml")).objective
+    assert initial is not None
     for k, highest in enumerate((10, 13, 16)):
         (tmp_path / "one.toml").write_text(ENGINE + BLOCK + MOUNTS + changed(SAG, ("40/3 Hz", f"{highest} Hz")))
         alone = solve(load(tmp_path / "one.toml"))
         assert alone.objective is not None
-        assert data["objective_given"].values[k] == pytest.approx(given.value, rel=1e-12)
+        assert data["objective_given"].values[k] == pytest.approx(initial.value, rel=1e-12)
         assert data["objective"].values[k] == pytest.approx(alone.objective.value, rel=1e-7)
         assert data["lower_bound"].values[k] <= data["objective"].values[k] * (1.0 + 1e-9)
     assert (np.diff(data["objective"].values) < 0.0).all(), "more room for frequencies, less sag"

@@ -84,8 +84,8 @@ def test_the_best_stiffness_with_its_damping_is_that_of_a_grid(tmp_path: Path) -
     problem = problem_of(tmp_path, ENGINE, BLOCK, tied, RMS + "[search]\nstarts = 4\n")
     result = solve(problem)
     grid = np.geomspace(2e4, 4e6, 400)
-    given = evaluate(problem)
-    values = [objective_value(problem, with_mounts(given, problem.design([float(k)]))) for k in grid]
+    initial = evaluate(problem)
+    values = [objective_value(problem, with_mounts(initial, problem.design([float(k)]))) for k in grid]
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value <= min(values) * (1.0 + 1e-6)
     assert result.objective.value == pytest.approx(min(values), rel=1e-2)

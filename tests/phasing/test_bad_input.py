@@ -40,8 +40,8 @@ def test_infeasible_says_what_conflicts(tmp_path, cylinders, cycle, engine, phas
     assert "\n" not in result.message
     if result.problem.phasing.throws is not None:
         # throws that cannot fire are no initial design either
-        given = evaluate_only(result.problem)
-        assert (given.status, given.message) == (result.status, result.message)
+        initial = evaluate_only(result.problem)
+        assert (initial.status, initial.message) == (result.status, result.message)
 
 
 def test_limits_that_no_star_keeps_are_named(tmp_path):

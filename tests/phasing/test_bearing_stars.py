@@ -195,7 +195,7 @@ def test_stress_rows_across_throws_are_those_of_the_exact_model() -> None:
     rows = model.at(model.samples)
     for star in family.stars:
         order = tuple(map(int, star))
-        own = phasing.problem_of(family.candidate(phasing, order))
+        star_problem = phasing.problem_of(family.candidate(phasing, order))
         term = rows.at(order).terms[0][1]
-        exact = evaluate(own).value(own.objective[0].measure)
+        exact = evaluate(star_problem).value(star_problem.objective[0].measure)
         assert term.norm.value(term.grid, term.constant) == pytest.approx(exact, rel=1e-9)

@@ -78,11 +78,13 @@ def test_rows_of_a_star_are_those_of_the_exact_model(tmp_path, name):
     rng = np.random.default_rng(3)
     for star in stars[rng.integers(0, len(stars), 4)]:
         x = np.concatenate([0.2 * d.scale * rng.uniform(0.0, 1.0, d.width) for d in model.domains])
-        given = model.phasing.problem_of(model.phasing.star(star, model.space.phases, model.geometry))
+        star_problem = model.phasing.problem_of(model.phasing.star(star, model.space.phases, model.geometry))
         unbalances = [domain.complex_value(x) for domain in model.domains]
         # decisions at any angle are counted from upright in the model: with equal drives that is the same rotor
-        turned = [u if not d.set.free_angle else u * _turn(d) for u, d in zip(unbalances, given.decisions, strict=True)]
-        value = objective_value(given, evaluate(given, given.design(turned)))
+        turned = [
+            u if not d.set.free_angle else u * _turn(d) for u, d in zip(unbalances, star_problem.decisions, strict=True)
+        ]
+        value = objective_value(star_problem, evaluate(star_problem, star_problem.design(turned)))
         again = model.at(model.samples).at(star).objective(x)
         tolerance = 2e-3 if name == "maximum" else 1e-9
         assert again == pytest.approx(value, rel=tolerance)

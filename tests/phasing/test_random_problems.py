@@ -26,20 +26,20 @@ def judge(problem):
     if problem is None:
         return
     result = solve(problem)
-    given = evaluate(problem)
+    initial = evaluate(problem)
     phasing = problem.phasing
     if result.status is Status.FAILED:
         # no bound rules uneven throws out: that no search found one is all that is known
         assert phasing is not None, result.message
         assert phasing.continuous, result.message
-        assert given.violation(problem.limits) > 0.0, result.message
+        assert initial.violation(problem.limits) > 0.0, result.message
         return
     if result.status is Status.INFEASIBLE:
         assert result.message or result.conflict
         return
     assert result.final.violation(result.problem.limits) <= FEASIBILITY_TOL
     assert phasing is None or phasing.intervals.holds(result.final.engine.firing_intervals, 1e-6)
-    if given.violation(problem.limits) <= 0.0 and (phasing is None or phasing.throw_bounds is None):
+    if initial.violation(problem.limits) <= 0.0 and (phasing is None or phasing.throw_bounds is None):
         assert result.objective.value <= result.objective.initial * (1.0 + 1e-6) + 1e-9
     assert result.certificate.lower_bound <= result.objective.value
 

@@ -104,8 +104,8 @@ def exact(phasing, window, throws):
 
 def best_of(phasing, window, throws):
     """Return the objective of one crank, unbalances at their proven optimum; infinite where it breaks a limit."""
-    given = exact(phasing, window, throws)
-    return StarDesign(Candidate(tuple(throws)), solve_fixed(given)).value
+    exact_problem = exact(phasing, window, throws)
+    return StarDesign(Candidate(tuple(throws)), solve_fixed(exact_problem)).value
 
 
 @pytest.mark.slow
@@ -160,20 +160,20 @@ def test_waves_add_up_to_the_exact_loads(tmp_path, name):
     for _ in range(3):
         window = windows[rng.integers(len(windows))]
         throws = drawn(rng, window)
-        given = exact(phasing, window, throws)
-        measure = given.objective[0].measure
+        exact_problem = exact(phasing, window, throws)
+        measure = exact_problem.objective[0].measure
         norm = waves.norm(measure, 1500)
         rows = norm.fixed.constant.copy()
         for part, wave in zip(waves.parts, norm.waves, strict=True):
             lap = 0 if part.cylinder is None else window.laps[part.cylinder]
             turned = np.exp(1j * waves.orders[:, 0] * (throws[part.pin] - math.tau * lap))
             rows += np.einsum("h,hkd->kd", turned, wave).real
-        design = given.design([0.0] * len(given.decisions))
-        if any(not np.isclose(d.set.lower, 0.0) for d in given.unbalances if d.set.width == 1):
-            design = given.design(
-                [d.set.lower * d.set.directions[0] if d.set.width == 1 else 0.0 for d in given.unbalances]
+        design = exact_problem.design([0.0] * len(exact_problem.decisions))
+        if any(not np.isclose(d.set.lower, 0.0) for d in exact_problem.unbalances if d.set.width == 1):
+            design = exact_problem.design(
+                [d.set.lower * d.set.directions[0] if d.set.width == 1 else 0.0 for d in exact_problem.unbalances]
             )
-        value = evaluate(given, design, 6000).value(measure)
+        value = evaluate(exact_problem, design, 6000).value(measure)
         result = norm.fixed.norm.value(norm.fixed.grid, rows)
         assert abs(result - value) <= 2e-4 * value + norm.left_out
 

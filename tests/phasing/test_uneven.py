@@ -100,14 +100,14 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
     order = tuple(int(k) + 1 for k in np.argsort([-angle % math.tau for angle in throws]))
     start = Candidate(throws, order)
     problem = phasing.problem_of(start)
-    given = evaluate(problem).value(problem.objective[0].measure)
+    initial_value = evaluate(problem).value(problem.objective[0].measure)
     actual = local_optimum(phasing, start, phasing.intervals)
-    assert actual.value <= given
+    assert actual.value <= initial_value
     assert actual.has_moved_throws
     assert actual.kkt_residual < 1e-6
     assert phasing.intervals.holds(actual.result.final.engine.firing_intervals)
     still = local_optimum(phasing, start, Intervals(phasing.even_interval, phasing.even_interval))
-    assert still.value == pytest.approx(given, rel=1e-12)
+    assert still.value == pytest.approx(initial_value, rel=1e-12)
 
 
 def test_prices_are_those_of_an_end_as_good_as_the_best_crank(tmp_path, monkeypatch):

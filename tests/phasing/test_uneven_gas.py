@@ -190,8 +190,8 @@ def test_even_firing_stays_where_it_is_best(tmp_path, orders, stays):
     phasing = engines.problem(tmp_path, 3, phasing=ALLOWED, rest=rest).phasing
     light = replace(phasing, problem_of=lambda candidate: _light(phasing.problem_of(candidate)))
     start = Candidate(tuple(math.tau * t / 3.0 for t in (0, 1, 2)), (1, 3, 2))
-    given = light.problem_of(start)
-    even = objective_value(given, evaluate(given))
+    star_problem = light.problem_of(start)
+    even = objective_value(star_problem, evaluate(star_problem))
     result = local_optimum(light, start, phasing.intervals)
     if stays:
         assert not result.has_moved_throws

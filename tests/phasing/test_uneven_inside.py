@@ -94,10 +94,10 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     problem = problem_of(engine, "rms main-bearing force", throws, **settings)
     phasing = problem.phasing
     start = start_candidates(phasing, None, True)[0]
-    own = replace(phasing.problem_of(start), phasing=None)
+    star_problem = replace(phasing.problem_of(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, phasing.intervals)
     turns, columns = ca.MX.sym("t", moves.size), ca.MX.sym("u", 1)
-    model = OpenCrankLoads(own, moves, turns, columns)
+    model = OpenCrankLoads(star_problem, moves, turns, columns)
     rng = np.random.default_rng(7)
     x = np.clip(rng.uniform(-0.1, 0.1, moves.size), moves.lower, moves.upper)
     moved = replace(phasing.problem_of(moves.candidate(x)), phasing=None)
@@ -122,9 +122,9 @@ def test_waves_of_throws_are_those_of_the_exact_model() -> None:
     for problem in cases:
         phasing, windows = problem.phasing, windows_of(problem, problem.phasing)
         start = start_candidates(phasing, None, True)[0]
-        own = replace(phasing.problem_of(start), phasing=None)
-        waves = ThrowWaves(own, phasing.layout_of(start), rotor_throws_of(phasing, start))
-        measure = own.objective[0].measure
+        star_problem = replace(phasing.problem_of(start), phasing=None)
+        waves = ThrowWaves(star_problem, phasing.layout_of(start), rotor_throws_of(phasing, start))
+        measure = star_problem.objective[0].measure
         norm = waves.norm(measure, waves.samples(measure, 192))
         window = windows[rng.integers(len(windows))]
         throws = nearest_throws(window, rng.uniform(*window.box))
@@ -169,8 +169,13 @@ def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
     minimum = math.inf
     for throws in itertools.product(*bounds):
         candidate = replace(start_candidates(phasing, None, True)[0], throws=tuple(map(float, throws)))
-        own = replace(phasing.problem_of(candidate), phasing=None)
-        minimum = min(minimum, solve_fixed(own).objective.value if weights else objective_value(own, evaluate(own)))
+        star_problem = replace(phasing.problem_of(candidate), phasing=None)
+        minimum = min(
+            minimum,
+            solve_fixed(star_problem).objective.value
+            if weights
+            else objective_value(star_problem, evaluate(star_problem)),
+        )
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
     assert result.certificate.lower_bound <= minimum * (1.0 + 1e-5)
     assert result.objective.value <= minimum * (1.0 + 1e-4)
@@ -188,8 +193,10 @@ def test_a_bank_that_is_open_beside_its_bearings() -> None:
     values = []
     for bank in np.radians(np.linspace(60, 120, 13)):
         throw = 0.5 * (bank - start.bank_angle) + start.throws[0]
-        own = replace(phasing.problem_of(replace(start, bank_angle=float(bank), throws=(float(throw),))), phasing=None)
-        values.append(objective_value(own, evaluate(own)))
+        star_problem = replace(
+            phasing.problem_of(replace(start, bank_angle=float(bank), throws=(float(throw),))), phasing=None
+        )
+        values.append(objective_value(star_problem, evaluate(star_problem)))
     assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-5)
     assert result.objective.value <= min(values) * (1.0 + 1e-4)
     # 192 samples tell 96 orders of a pressure that jumps, and what lies beyond is taken off
@@ -214,10 +221,10 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
     for throws in itertools.product(
         *(np.linspace(*pair, 6 if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds)
     ):
-        own = replace(phasing.problem_of(replace(start, throws=tuple(map(float, throws)))), phasing=None)
-        found = evaluate(own)
+        star_problem = replace(phasing.problem_of(replace(start, throws=tuple(map(float, throws)))), phasing=None)
+        found = evaluate(star_problem)
         if found.value(degree) <= maximum:
-            minimum = min(minimum, objective_value(own, found))
+            minimum = min(minimum, objective_value(star_problem, found))
     assert result.certificate.lower_bound <= minimum * (1.0 + 1e-5)
     assert result.objective.value <= minimum * (1.0 + 1e-4)
     limited = laufruhe.solve(

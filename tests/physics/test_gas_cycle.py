@@ -649,5 +649,5 @@ class TestCylindersAlike:
         first = gas_coefficients(DIESEL, part, Cycle.FOUR_STROKE).coefficients
         # without an offset the same holds for a crank that turns backwards
         for other in (replace(part, bore=0.11), replace(part, crank_radius=0.055), *([turned] if part.offset else [])):
-            own = gas_coefficients(DIESEL, other, Cycle.FOUR_STROKE).coefficients
-            assert not np.array_equal(own, first)
+            coefficients = gas_coefficients(DIESEL, other, Cycle.FOUR_STROKE).coefficients
+            assert not np.array_equal(coefficients, first)

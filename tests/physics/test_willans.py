@@ -244,10 +244,10 @@ def test_a_limit_on_the_worst_mean_is_one_on_every_point(tmp_path: Path) -> None
         f'[[constraints]]\nname = "{k}"\nlimit = "mean mount force"\n{maximum}operating_points = ["{point.name}"]\n'
         for k, point in enumerate(problem.points)
     )
-    apart = laufruhe.solve(loaded(tmp_path, minimum + each))
-    assert joint.certificate.kind is apart.certificate.kind is Proof.GLOBAL
-    assert joint.objective.value == pytest.approx(apart.objective.value, rel=2e-4)
-    prices = sum(limit.shadow_price for limit in apart.limits)
+    separate = laufruhe.solve(loaded(tmp_path, minimum + each))
+    assert joint.certificate.kind is separate.certificate.kind is Proof.GLOBAL
+    assert joint.objective.value == pytest.approx(separate.objective.value, rel=2e-4)
+    prices = sum(limit.shadow_price for limit in separate.limits)
     assert joint.limits[0].shadow_price == pytest.approx(prices, rel=1e-2)
 
 

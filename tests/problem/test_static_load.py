@@ -87,12 +87,12 @@ def test_norms_that_do_not_add_have_no_share() -> None:
 
 
 def test_an_alternating_objective_names_what_it_leaves_out() -> None:
-    given = load(FOUR)
-    problem, evaluation = with_loads(given, alternating=True), evaluate(given)
+    variant = load(FOUR)
+    problem, evaluation = with_loads(variant, alternating=True), evaluate(variant)
     part = static_part(problem, evaluation)
-    assert part == static_part(given, evaluation)
+    assert part == static_part(variant, evaluation)
     assert part is not None
-    assert part.whole == objective_value(given, evaluation)
+    assert part.whole == objective_value(variant, evaluation)
     assert part.alternating == objective_value(problem, evaluation)
     assert static_sentence(problem, evaluation).startswith(
         "The steady reaction to the mean torque, 160.5 N alone, is left out"
@@ -108,13 +108,13 @@ def test_an_engine_without_gas_has_no_static_part() -> None:
 
 @pytest.mark.slow
 def test_the_optimum_of_alternating_loads_is_proven_and_no_other_design_is_better() -> None:
-    given = load(FOUR)
-    whole, result = solve(given), solve(with_loads(given, alternating=True))
+    variant = load(FOUR)
+    whole, result = solve(variant), solve(with_loads(variant, alternating=True))
     assert result.objective is not None
     assert result.certificate is not None
     assert result.objective.name == "mean alternating mount force"
     assert result.certificate.kind == "global"
-    assert with_loads(result.problem, alternating=False).objective == given.objective
+    assert with_loads(result.problem, alternating=False).objective == variant.objective
     assert result.objective.value < objective_value(result.problem, whole.final)
     rng, problem = np.random.default_rng(3), result.problem
     for _ in range(40):

@@ -36,15 +36,15 @@ CASES = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "quantity", "engine"), CASES)
 def test_no_even_star_with_any_weights_goes_under_it(name: str, quantity: str, engine: dict[str, Any]) -> None:
-    own = problem(name, quantity, **engine)
+    variant = problem(name, quantity, **engine)
     random, found = np.random.default_rng(3), []
-    stars = even_stars(own.phasing)
+    stars = even_stars(variant.phasing)
     for k in random.choice(len(stars), 4):
-        realised = replace(own.phasing.problem_of(stars[int(k)][0]), phasing=None)
+        realised = replace(variant.phasing.problem_of(stars[int(k)][0]), phasing=None)
         for size in (0.0, 0.02, 0.3):
             values = [complex(*random.normal(0.0, 0.1 * size, 2)) for _ in realised.unbalances]
             design = evaluate(realised, realised.design(values, realised.unbalances))
-            bound = firing_bound(own, design)
+            bound = firing_bound(variant, design)
             found.append(bound)
             assert objective_value(realised, design) >= bound * (1.0 - 1e-9) > 0.0
     assert found == pytest.approx([found[0]] * len(found), rel=1e-6)
@@ -52,33 +52,33 @@ def test_no_even_star_with_any_weights_goes_under_it(name: str, quantity: str, e
 
 @pytest.mark.slow
 def test_a_six_in_line_reaches_it() -> None:
-    own = problem("inline", cylinders=6)
-    result = solve(own)
-    assert result.objective.value == pytest.approx(firing_bound(own, result.final), rel=1e-6)
+    variant = problem("inline", cylinders=6)
+    result = solve(variant)
+    assert result.objective.value == pytest.approx(firing_bound(variant, result.final), rel=1e-6)
     assert str(result.certificate.kind) == "global"
 
 
 def test_shafts_that_turn_with_the_firing_leave_no_common_bound() -> None:
     """Four cylinders fire twice a turn, as the shafts of the second order turn."""
-    own = problem("inline", cylinders=4)
-    (candidate, _), *_ = even_stars(own.phasing)
-    realised = replace(own.phasing.problem_of(candidate), phasing=None)
-    assert firing_bound(own, evaluate(realised)) == 0.0
+    variant = problem("inline", cylinders=4)
+    (candidate, _), *_ = even_stars(variant.phasing)
+    realised = replace(variant.phasing.problem_of(candidate), phasing=None)
+    assert firing_bound(variant, evaluate(realised)) == 0.0
 
 
 def test_omitted_shafts_or_unlike_cylinders_leave_no_common_bound() -> None:
     """Another design may have these shafts; and the loads of unlike cylinders are not one load shifted."""
-    own = problem("inline", cylinders=4)
-    (candidate, _), *_ = even_stars(own.phasing)
-    realised = replace(own.phasing.problem_of(candidate), phasing=None)
+    variant = problem("inline", cylinders=4)
+    (candidate, _), *_ = even_stars(variant.phasing)
+    realised = replace(variant.phasing.problem_of(candidate), phasing=None)
 
     def bound(unlike: float, known: Problem) -> float:
         first, *others = realised.engine.slider_cranks
         parts = (replace(first, reciprocating_mass=unlike * first.reciprocating_mass), *others)
         return firing_bound(known, evaluate(realised, replace(realised.engine, rotors=(), slider_cranks=parts)))
 
-    alike = replace(own, engine=replace(own.engine, rotors=()))
-    assert own.engine.rotors
+    alike = replace(variant, engine=replace(variant.engine, rotors=()))
+    assert variant.engine.rotors
     assert bound(1.0, alike) > 0.0
-    assert bound(1.0, own) == 0.0
+    assert bound(1.0, variant) == 0.0
     assert bound(1.1, alike) == 0.0

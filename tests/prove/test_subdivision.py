@@ -255,12 +255,12 @@ def test_few_open_stiffnesses_are_decided_with_proof(objective: str, tmp_path: P
     assert result.certificate.kind == "global"
     assert result.certificate.gap <= problem.tolerance
     assert "bounds of mounts from" in result.certificate.method
-    given = evaluate(problem)
+    initial = evaluate(problem)
 
     axes = [np.geomspace(d.lower, d.upper, 17) for d in problem.mount_decisions]
     values = []
     for x in itertools.product(*axes):
-        design = with_mounts(given, problem.design(list(x)))
+        design = with_mounts(initial, problem.design(list(x)))
         if all(design.check_limit(each).violation <= 0.0 for each in problem.mount_limits):
             values.append(objective_value(problem, design))
     assert len(values) > 100

@@ -67,8 +67,8 @@ def read(tmp_path: Path, text: str) -> Problem:
 def bearings_by_hand(problem: Problem, masses: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the force on each bearing from the bare crank and weights by lever rule, shape (720, 4, 2)."""
     bare = problem.design([0.0] * len(masses))
-    given = laufruhe.evaluate(bare, problem.points).final.loads[0]
-    force = laufruhe.problem.channels.MAIN_BEARING_FORCE.signal(given).sample(720)[..., 1:]
+    initial = laufruhe.evaluate(bare, problem.points).final.loads[0]
+    force = laufruhe.problem.channels.MAIN_BEARING_FORCE.signal(initial).sample(720)[..., 1:]
     angles = 4.0 * np.pi * np.arange(720) / 720
     speed, x = problem.points[0].speed, [bearing.x for bearing in problem.engine.bearings]
     for mass, rotor in zip(masses, problem.engine.rotors[-len(masses) :], strict=True):

@@ -106,20 +106,20 @@ def test_the_optimum_is_the_same_in_every_unit_of_the_load(unit: float) -> None:
         (weight, replace(norm, constant=unit * norm.constant, slope=unit * norm.slope))
         for weight, norm in problem.terms
     )
-    own, other = newton_solution(problem), newton_solution(replace(problem, terms=terms))
-    assert own is not None
+    solution, other = newton_solution(problem), newton_solution(replace(problem, terms=terms))
+    assert solution is not None
     assert other is not None
-    assert other[0] == pytest.approx(own[0], rel=1e-6)
+    assert other[0] == pytest.approx(solution[0], rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("kind", SCENES)
 def test_it_proves_the_optimum_of_the_cones(kind: str, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = SCENES[kind](seed)
-    own, other = newton_solution(problem), by_cones(problem, monkeypatch)
-    assert own is not None
+    solution, other = newton_solution(problem), by_cones(problem, monkeypatch)
+    assert solution is not None
     assert other.x is not None
-    x, multipliers = own
+    x, multipliers = solution
     value, bound = problem.objective(x), lower_bound(problem, multipliers).value
     assert value * (1.0 - PROVEN) <= bound <= value * (1.0 + 1e-12)
     assert value == pytest.approx(problem.objective(other.x), rel=1e-8)

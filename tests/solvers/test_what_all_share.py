@@ -107,12 +107,12 @@ def test_limits_that_no_unbalance_keeps_on_any_mounts(minimum: str, tmp_path: Pa
 def test_no_design_worse_than_the_initial_one_is_returned() -> None:
     """Check that the initial design replaces a worse proposal, with the proven bound."""
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
-    given = evaluate(problem)
+    initial = evaluate(problem)
     worse = evaluate_design(problem, [-decision.upper for decision in problem.decisions])
-    value = objective_value(problem, given)
+    value = objective_value(problem, initial)
     assert worse.value > value
     shown = ProofData(0.5 * value, ProofStrength.EXACT, 0.0, "a guess")
-    result = build_result(worse, given, shown, {})
+    result = build_result(worse, initial, shown, {})
     assert result.objective is not None
     assert result.certificate is not None
     assert result.objective.value == value

@@ -96,8 +96,8 @@ def test_no_torque_on_a_grid_beats_the_proven_one(seed: int) -> None:
     engine = {"throws": throws, "firing_order": order, "reciprocating_mass": f"{rng.uniform(0.4, 1.2)} kg"}
     orders = sorted(rng.choice([0.5, 1.0, 1.5, 2.0, 3.0], 2, replace=False).tolist())
     largest = float(rng.uniform(20.0, 300.0))
-    given = machine(orders=orders, max_torque=f"{largest} N m", stator="block")
-    problem = problem_of([given], f"{norm} {channel}", engine=engine)
+    machine_table = machine(orders=orders, max_torque=f"{largest} N m", stator="block")
+    problem = problem_of([machine_table], f"{norm} {channel}", engine=engine)
     result = laufruhe.solve(problem)
     assert result.objective is not None
     assert result.certificate is not None
@@ -191,8 +191,10 @@ def test_reactions_follow_from_work_and_from_the_moments_on_the_whole(
     A shaft of ratio -2 turns twice as fast and backwards: its machine on the ground pushes the whole engine forwards,
     against the reaction of its mounts, by its torque.
     """
-    given = machine(orders=[], harmonics=[{"order": 3, "torque": "40 N m", "angle": 30}], shaft=shaft, stator=stator)
-    problem = problem_of([given], None, balancer_shafts=[{**SHAFT, "unbalances": [{"unbalance": "0 kg m"}]}])
+    machine_table = machine(
+        orders=[], harmonics=[{"order": 3, "torque": "40 N m", "angle": 30}], shaft=shaft, stator=stator
+    )
+    problem = problem_of([machine_table], None, balancer_shafts=[{**SHAFT, "unbalances": [{"unbalance": "0 kg m"}]}])
     engine, (point,) = problem.engine, problem.points
     torque = 40.0 * np.exp(1j * math.radians(30.0))
     driven = excess_torque(engine, point).at(3.0) - excess_torque(engine.unloaded, point).at(3.0)
@@ -204,9 +206,9 @@ def test_reactions_follow_from_work_and_from_the_moments_on_the_whole(
 
 def test_at_an_uneven_speed_the_torque_turns_the_crank() -> None:
     """Check w^2 = w_0^2 + 2 T sin(h phi) / (J h) of a machine on a heavy crank, and T on the block."""
-    given = machine(orders=[], harmonics=[{"order": 2, "torque": "50 N m"}])
+    machine_table = machine(orders=[], harmonics=[{"order": 2, "torque": "50 N m"}])
     engine = {"reciprocating_mass": "1e-9 kg"}
-    problem = problem_of([given], None, engine=engine, fidelity={"crank_inertia": "0.8 kg m^2"}, gas=None)
+    problem = problem_of([machine_table], None, engine=engine, fidelity={"crank_inertia": "0.8 kg m^2"}, gas=None)
     facts = torque_facts(problem.engine, problem.points[0], problem.fidelity)
     speed = problem.points[0].speed
     ends = [math.sqrt(speed**2 + sign * 2.0 * 50.0 / 0.8 / 2.0) for sign in (1.0, -1.0)]
@@ -222,15 +224,15 @@ def test_a_machine_twists_the_shaft_from_its_disc() -> None:
         "throw_inertia": "0.05 kg m^2",
         "discs": [{"name": "rotor", "end": "rear", "inertia": "0.8 kg m^2", "shaft": {"stiffness": "3e4 N m/rad"}}],
     }
-    given = machine(orders=[], harmonics=[{"order": 2, "torque": "50 N m", "angle": 70}], disc="rotor")
+    machine_table = machine(orders=[], harmonics=[{"order": 2, "torque": "50 N m", "angle": 70}], disc="rotor")
     single = {"throws": [0], "firing_order": [1]}
-    problem = problem_of([given], None, engine=single, torsion=torsion)
+    problem = problem_of([machine_table], None, engine=single, torsion=torsion)
     (point,), (front, rear) = problem.points, inertias(chain_of(problem.engine))
     response = 3e4 * (1.0 / front + 1.0 / rear) - (2.0 * point.speed) ** 2
     moved = twist(problem.engine, point).at(2.0) - twist(problem.engine.unloaded, point).at(2.0)
     assert moved[0] == pytest.approx(-50.0 * np.exp(1j * math.radians(70.0)) / rear / response, rel=1e-9)
     with pytest.raises(InputError, match=r"'fan' is no disc of \[torsion\]|fan.* is no disc"):
-        problem_of([{**given, "disc": "fan"}], None, engine=single, torsion=torsion)
+        problem_of([{**machine_table, "disc": "fan"}], None, engine=single, torsion=torsion)
 
 
 def test_loads_depend_on_torques_as_the_table_says() -> None:

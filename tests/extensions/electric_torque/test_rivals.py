@@ -97,7 +97,7 @@ def test_no_design_of_slsqp_lies_under_the_bound(seed: int) -> None:
     orders = sorted(rng.choice([0.5, 1, 1.5, 2, 2.5, 3, 4, 6], int(rng.integers(1, 4)), replace=False).tolist())
     largest = float(10.0 ** rng.uniform(1.0, 2.7))
     loss = RESISTANCE * (largest * rng.uniform(0.3, 1.2) / CONSTANT) ** 2
-    given = machine(
+    machine_table = machine(
         orders=orders, max_torque=f"{largest!r} N m", torque_constant=f"{CONSTANT} N m/A",
         resistance=f"{RESISTANCE} ohm", max_loss=f"{loss!r} W",
     )  # fmt: skip
@@ -107,7 +107,7 @@ def test_no_design_of_slsqp_lies_under_the_bound(seed: int) -> None:
     engine = {"throws": throws, "firing_order": order, "reciprocating_mass": f"{rng.uniform(0.3, 1.5)} kg"}
     shafts = [{**SHAFT, "ratio": float(rng.choice([-2, -1, 1, 2]))}] if rng.random() < 0.6 else None
     problem = problem_of(
-        [given], f"{norm} {channel}", engine=engine, operating_points=points, balancer_shafts=shafts
+        [machine_table], f"{norm} {channel}", engine=engine, operating_points=points, balancer_shafts=shafts
     )  # fmt: skip
     result = laufruhe.solve(problem)
     rivals = Rivals(problem, largest, loss)

@@ -108,8 +108,8 @@ AUTOMATIC = 25
 def test_automatic_choice_keeps_its_word(seed: int) -> None:
     problem = random_problem(random.Random(5000 + seed))
     choice = choose(problem, 1e-2)
-    own = replace(problem, fidelity=choice.fidelity)
-    value = objective_value(own, evaluate(own))
+    variant = replace(problem, fidelity=choice.fidelity)
+    value = objective_value(variant, evaluate(variant))
     truth = objective_value(problem, evaluate(finer(problem, 7001)))
     assert abs(value - truth) <= choice.error_estimate * max(value, 1e-300)
     assert choice.error_estimate <= 1.05e-2 or choice.fidelity.samples >= 5760

@@ -47,15 +47,15 @@ def _violation(seed: int) -> tuple[float, float]:
     """Return the true error less the stated one, and their ratio."""
     rng = random.Random(300_000 + seed)
     problem = random_elastic_problem(rng, gas=False)
-    own = replace(problem, fidelity=_fidelity(rng))
+    variant = replace(problem, fidelity=_fidelity(rng))
     try:
-        evaluation, best = evaluate(own), reference(own, samples=720)
+        evaluation, best = evaluate(variant), reference(variant, samples=720)
     except UncarriedLoadError:
         return 0.0, 1.0
-    value = objective_value(own, evaluation)
+    value = objective_value(variant, evaluation)
     truth = objective_value(problem, evaluate(finer(problem, 7001)))
     true = abs(value - truth) / value if value else 0.0
-    stated = Reference(own, best).error_of(evaluation)
+    stated = Reference(variant, best).error_of(evaluation)
     return true - stated, stated / true if true > 1e-6 else 1.0
 
 
@@ -93,8 +93,8 @@ def test_automatic_on_random_engines(seed: int) -> None:
 def _keeps_its_word(problem: Problem, tolerance: float) -> None:
     """Check that the error of the choice is as stated, and that each part put back changes less than stated."""
     choice = choose(problem, tolerance)
-    own = replace(problem, fidelity=choice.fidelity)
-    value = objective_value(own, evaluate(own))
+    variant = replace(problem, fidelity=choice.fidelity)
+    value = objective_value(variant, evaluate(variant))
     truth = objective_value(problem, evaluate(finer(problem, 7001)))
     assert abs(value - truth) <= choice.error_estimate * max(value, 1e-300)
     assert choice.error_estimate <= 1.5 * tolerance

@@ -38,12 +38,12 @@ def _errors(seed: int) -> tuple[float, float]:
     """Return the true error and stated error of a fidelity, relative to its objective."""
     rng = random.Random(seed)
     problem = random_problem(rng)
-    own = replace(problem, fidelity=_fidelity(rng))
-    evaluation, best = evaluate(own), reference(own, samples=1440)
-    value = objective_value(own, evaluation)
+    variant = replace(problem, fidelity=_fidelity(rng))
+    evaluation, best = evaluate(variant), reference(variant, samples=1440)
+    value = objective_value(variant, evaluation)
     # many steps, no multiple of the reference's, so that both can be wrong in their own way
     truth = objective_value(problem, evaluate(finer(problem, 14401)))
-    return abs(value - truth) / value if value else 0.0, Reference(own, best).error_of(evaluation)
+    return abs(value - truth) / value if value else 0.0, Reference(variant, best).error_of(evaluation)
 
 
 @pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 1, 2))
@@ -64,13 +64,13 @@ def _scene(make, seed: int) -> Problem:
 def test_estimate_with_few_orders_of_gas_is_not_below_the_error(make, seed: int) -> None:
     rng, problem = random.Random(seed), _scene(make, seed)
     fidelity = Fidelity(samples=rng.choice([96, 360, 720]), gas_orders=rng.choice([1, 2, 4, 8, 12, 24]))
-    own = replace(problem, fidelity=replace(fidelity, orders=rng.choice([None, None, 16]), gas_samples=1440))
+    variant = replace(problem, fidelity=replace(fidelity, orders=rng.choice([None, None, 16]), gas_samples=1440))
     try:
-        evaluation, best = evaluate(own), reference(own)
+        evaluation, best = evaluate(variant), reference(variant)
     except UncarriedLoadError:
         return
-    value, truth = objective_value(own, evaluation), objective_value(problem, evaluate(finer(problem, 7001)))
-    assert abs(value - truth) <= Reference(own, best).error_of(evaluation) * max(value, 1e-300)
+    value, truth = objective_value(variant, evaluation), objective_value(problem, evaluate(finer(problem, 7001)))
+    assert abs(value - truth) <= Reference(variant, best).error_of(evaluation) * max(value, 1e-300)
 
 
 def test_stars_keep_the_choice() -> None:

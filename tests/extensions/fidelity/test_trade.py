@@ -78,8 +78,8 @@ def test_rows_are_what_separate_calls_return() -> None:
     problem = load(PROBLEMS / "tractor-single.toml")
     found = {row.name: row for row in trade(problem).rows}
     for name, fidelity in (("two-order, 720 steps", Fidelity("two-order", 720)), ("exact, 1440 steps", Fidelity())):
-        row, own = found[name], problem.at(fidelity)
-        result = laufruhe.solve(own)
+        row, variant = found[name], problem.at(fidelity)
+        result = laufruhe.solve(variant)
         truth = objective_value(problem, reference(problem, result.final.engine))
         assert row.optimum == pytest.approx(truth, rel=1e-9)
         assert row.regret_bound == pytest.approx(result.regret_bound, rel=1e-6, abs=1e-9)

@@ -30,12 +30,12 @@ def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: i
     problem, generator = joint(seed), np.random.default_rng(seed)
     loads = MountedLoads(problem)
     (_, mounts), (_, other) = boxes_of(problem, generator, 2, 0.5)
-    given = loads.at(mounts)
-    _, multipliers = best_at(given)
+    mounted_loads = loads.at(mounts)
+    _, multipliers = best_at(mounted_loads)
     # any rows of the limits say something, and have their price
-    drawn = tuple(generator.normal(size=norm.constant.shape) for _, norm in given.limits)
+    drawn = tuple(generator.normal(size=norm.constant.shape) for _, norm in mounted_loads.limits)
     multipliers = replace(multipliers, limits=drawn)
-    pairing, used = loads.pairing(given, multipliers), minorant(given, multipliers).multipliers
+    pairing, used = loads.pairing(mounted_loads, multipliers), minorant(mounted_loads, multipliers).multipliers
     # by the rows of the exact model
     held = problem.design(other.tolist(), problem.mount_decisions)
     there = AffineModel(replace(problem, engine=held).balance, keep_all=True).at(loads.samples)
@@ -44,7 +44,7 @@ def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: i
         size = np.abs(exact.constant).max()
         assert np.abs(mine.constant - exact.constant).max() <= 1e-9 * size
         assert np.abs(mine.slope - exact.slope).max() <= 1e-9 * np.abs(exact.slope).max()
-    u = generator.normal(size=given.size)
+    u = generator.normal(size=mounted_loads.size)
     rows = sum(weight * np.vdot(z, norm.rows(u)) for (weight, norm), z in zip(again.terms, used.terms, strict=True))
     for (maximum, norm), z in zip(again.limits, used.limits, strict=True):
         rows += np.vdot(z, norm.rows(u)) - norm.dual_norm(z) * maximum
@@ -61,11 +61,11 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
     """Check that the bound of an infeasible corner is above the value of its unbalances."""
     problem, generator = joint(seed), np.random.default_rng(1)
     ((_, mounts),) = boxes_of(problem, generator, 1, 0.5)
-    given = MountedLoads(problem).at(mounts)
-    x, multipliers = best_at(given)
-    assert all(norm.value(x) <= maximum * (1.0 + 1e-6) for maximum, norm in given.limits)
-    assert lower_bound(given, multipliers).value == pytest.approx(given.objective(x), rel=1e-3)
-    tight = replace(given, limits=tuple((0.3 * maximum, norm) for maximum, norm in given.limits))
+    mounted_loads = MountedLoads(problem).at(mounts)
+    x, multipliers = best_at(mounted_loads)
+    assert all(norm.value(x) <= maximum * (1.0 + 1e-6) for maximum, norm in mounted_loads.limits)
+    assert lower_bound(mounted_loads, multipliers).value == pytest.approx(mounted_loads.objective(x), rel=1e-3)
+    tight = replace(mounted_loads, limits=tuple((0.3 * maximum, norm) for maximum, norm in mounted_loads.limits))
     x, multipliers = best_at(tight)
     assert any(norm.value(x) > maximum * 1.01 for maximum, norm in tight.limits)
     # by once the value of these unbalances
@@ -75,9 +75,9 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
 def test_a_corner_is_proven_as_closely_for_any_weights() -> None:
     problem = joint(780017)
     ((_, mounts),) = boxes_of(problem, np.random.default_rng(1), 1, 0.5)
-    given, gaps = MountedLoads(problem).at(mounts), []
+    mounted_loads, gaps = MountedLoads(problem).at(mounts), []
     for times in (1e-6, 1.0, 1e6):
-        weighted = replace(given, terms=tuple((times * weight, norm) for weight, norm in given.terms))
+        weighted = replace(mounted_loads, terms=tuple((times * weight, norm) for weight, norm in mounted_loads.terms))
         x, multipliers = best_at(weighted)
         gaps.append(1.0 - lower_bound(weighted, multipliers).value / weighted.objective(x))
     assert gaps == pytest.approx([gaps[1]] * 3, rel=1e-3)

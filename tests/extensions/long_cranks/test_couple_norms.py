@@ -64,22 +64,22 @@ def even_stars(family: Family) -> Stars:
 def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_path):
     """Check that values are at most those of the cycle and near them, and that windows hold all better stars."""
     problem, family = problem_of_norm(tmp_path, cylinders, cycle, name, gas)
-    own, stars = norms_of(problem, family), even_stars(family)
-    assert own is not None
+    norms, stars = norms_of(problem, family), even_stars(family)
+    assert norms is not None
     exact = np.array([
         objective_value(problem, with_fine_sampling(evaluate(of_star(problem, family, star)))) for star in stars
     ])  # fmt: skip
-    low = own.values(family.space, stars)
+    low = norms.values(family.space, stars)
     assert (low <= exact * (1.0 + 1e-9)).all()
     assert low == pytest.approx(exact, rel=5e-3)
-    assert own.lower_bound(family.space) <= low.min() * (1.0 + 1e-9)
-    assert low.max() <= own.upper_bound(family.space)
+    assert norms.lower_bound(family.space) <= low.min() * (1.0 + 1e-9)
+    assert low.max() <= norms.upper_bound(family.space)
     for maximum in np.quantile(exact, (0.0, 0.1, 0.5, 0.9)):
-        window = own.window(family.space, family.space.patterns[0], maximum)
+        window = norms.window(family.space, family.space.patterns[0], maximum)
         couples = np.abs(star_sums(stars, family.space.phases, family.space.places, window.orders)[:, :, 1])
         assert (couples <= window.reaches)[exact <= maximum].all()
         # values above the maximum may be bounded from below, others are exact
-        bounded = own.values(family.space, stars, maximum)
+        bounded = norms.values(family.space, stars, maximum)
         assert bounded[low <= maximum] == pytest.approx(low[low <= maximum], rel=1e-12)
         assert (bounded[low > maximum] > maximum).all()
         assert (bounded <= low * (1.0 + 1e-9)).all()
@@ -88,18 +88,18 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
 @pytest.mark.parametrize(("cylinders", "cycle", "gas"), [(7, "two-stroke", True), (9, "four-stroke", False)])
 def test_a_rotated_star_has_the_same_value(cylinders, cycle, gas, tmp_path):
     problem, family = problem_of_norm(tmp_path, cylinders, cycle, "rms", gas)
-    own, r = norms_of(problem, family), np.random.default_rng(4)
+    norms, r = norms_of(problem, family), np.random.default_rng(4)
     stars = np.array([[0, *r.permutation(family.first[1:])] for _ in range(20)], dtype=np.uint8)
     turned = ((stars.astype(int) + 3) % family.space.phases).astype(np.uint8)
-    assert own.values(family.space, turned) == pytest.approx(own.values(family.space, stars), rel=1e-9)
+    assert norms.values(family.space, turned) == pytest.approx(norms.values(family.space, stars), rel=1e-9)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("cylinders", "name", "gas"), [(7, "mean", False), (8, "maximum", True), (7, "rms", True)])
 def test_halves_find_the_best_of_all_stars(cylinders, name, gas, tmp_path):
     problem, family = problem_of_norm(tmp_path, cylinders, "two-stroke", name, gas)
-    own = norms_of(problem, family)
-    found, every = (how(family.space, own, 6) for how in (search_stars, enumerate_stars))
+    norms = norms_of(problem, family)
+    found, every = (how(family.space, norms, 6) for how in (search_stars, enumerate_stars))
     assert found.complete
     np.testing.assert_allclose(found.values, every.values, rtol=1e-9)
 
@@ -120,11 +120,11 @@ def test_long_cranks_are_proven(cylinders, name, gas, tmp_path):
     problem, family = problem_of_norm(tmp_path, cylinders, "two-stroke", name, gas)
     result = solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
-    own, r = norms_of(problem, family), np.random.default_rng(cylinders)
+    norms, r = norms_of(problem, family), np.random.default_rng(cylinders)
     drawn = np.array([[0, *r.permutation(family.first[1:])] for _ in range(3000)], dtype=np.uint8)
     best = np.round(np.array(result.phasing.ranking[0].throws) / (2.0 * np.pi) * cylinders).astype(np.uint8)
     near = swaps(best % cylinders)
-    values = own.values(family.space, np.concatenate([drawn, near]))
+    values = norms.values(family.space, np.concatenate([drawn, near]))
     assert values.min() >= result.certificate.lower_bound * (1.0 - 1e-4)
 
 

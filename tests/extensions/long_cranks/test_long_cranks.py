@@ -46,8 +46,10 @@ def test_pairs_of_throws_leave_what_every_even_star_has(cylinders: int, norm: st
     steps = np.array(family.first)
     values = []
     for _ in range(40):
-        own = problem.phasing.problem_of(family.candidate(problem.phasing, (0, *r.permutation(steps[1:]).tolist())))
-        values.append(objective_value(own, evaluate(own)))
+        star_problem = problem.phasing.problem_of(
+            family.candidate(problem.phasing, (0, *r.permutation(steps[1:]).tolist()))
+        )
+        values.append(objective_value(star_problem, evaluate(star_problem)))
     assert min(values) >= result.certificate.lower_bound
     assert min(values) > 10.0 * result.objective.value
 
@@ -61,8 +63,10 @@ def test_a_long_crank_is_good_where_a_program_has_no_time(tmp_path: Path) -> Non
     r = np.random.default_rng(20)
     values = []
     for _ in range(300):
-        own = problem.phasing.problem_of(family.candidate(problem.phasing, (0, *(1 + r.permutation(19)).tolist())))
-        values.append(objective_value(own, evaluate(own)))
+        star_problem = problem.phasing.problem_of(
+            family.candidate(problem.phasing, (0, *(1 + r.permutation(19)).tolist()))
+        )
+        values.append(objective_value(star_problem, evaluate(star_problem)))
     assert result.certificate.lower_bound <= result.objective.value < 0.1 * min(values)
 
 

@@ -104,7 +104,7 @@ def test_no_star_below_a_value_is_left_out(name):
     values = objective.values(space, every)
     median, free = float(np.median(values)), Free.from_pattern(space.patterns[0])
     window = objective.window(space, space.patterns[0], median)
-    blocks = [block for own in shares_of(space, free) for block in meeting(space, free, own, window)]
+    blocks = [block for share in shares_of(space, free) for block in meeting(space, free, share, window)]
     found = {tuple(star) for block in blocks for star in space.canonical(block)}
     assert {tuple(star) for star in every[values < median * (1.0 - 1e-9)]} <= found
 
@@ -123,7 +123,9 @@ def test_rearranged_throws_meet_in_every_star_of_a_window_and_no_other(seed, ord
     # the window ends between two stars
     reaches = tuple(np.abs(couples[int(r.integers(5040))]) * (1.0 + 1e-6) + 10.0**width)
     free = Free.from_throws(steps, throws)
-    blocks = [block for own in shares_of(space, free) for block in meeting(space, free, own, Window(orders, reaches))]
+    blocks = [
+        block for share in shares_of(space, free) for block in meeting(space, free, share, Window(orders, reaches))
+    ]
     found = {tuple(star) for block in blocks for star in block}
     assert {tuple(star) for star in every[(couples <= np.array(reaches)).all(axis=1)]} <= found
     parts = np.concatenate([star_sums(block, 5, space.places, orders)[:, :, 1] for block in blocks])
@@ -138,7 +140,7 @@ def test_some_throws_are_arranged_in_every_order(throws):
         Free.from_throws(np.arange(throws, dtype=np.uint8), (1, 2, 3, 4)),
     )
     wide = Window((1, 2), (np.inf, np.inf))
-    result = np.concatenate([block for own in shares_of(space, free) for block in meeting(space, free, own, wide)])
+    result = np.concatenate([block for share in shares_of(space, free) for block in meeting(space, free, share, wide)])
     assert len(np.unique(result, axis=0)) == len(result) == 24
     assert (result[:, 5:] == np.arange(5, throws)).all()
 

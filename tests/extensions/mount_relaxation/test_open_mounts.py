@@ -52,10 +52,10 @@ def test_no_stiffness_of_a_box_is_outside_of_what_is_known(tmp_path: Path, place
     mounts = known(problem)
     for x in designs(problem, 40):
         mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
-        own = mounts.root @ mounting.stiffness @ mounts.root.T
-        size = float(np.linalg.norm(own))
-        assert minimum(mounts.maximum - own) >= -1e-9 * size
-        assert minimum(own - mounts.minimum) >= -1e-9 * size
+        scaled_stiffness = mounts.root @ mounting.stiffness @ mounts.root.T
+        size = float(np.linalg.norm(scaled_stiffness))
+        assert minimum(mounts.maximum - scaled_stiffness) >= -1e-9 * size
+        assert minimum(scaled_stiffness - mounts.minimum) >= -1e-9 * size
 
 
 def test_mounts_that_mirror_each_other_move_in_two_halves(tmp_path: Path) -> None:
@@ -74,11 +74,11 @@ def test_limits_on_frequencies_are_those_of_the_stiffness(tmp_path: Path) -> Non
     (floor,), (ceiling,) = mounts.floors, mounts.ceilings
     for x in designs(problem, 200):
         mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
-        own, hertz = mounts.root @ mounting.stiffness @ mounts.root.T, mounting.modes.frequencies
+        scaled_stiffness, hertz = mounts.root @ mounting.stiffness @ mounts.root.T, mounting.modes.frequencies
         if abs(hertz[0] / 4.0 - 1.0) > 1e-3:
-            assert (minimum(own - floor) > 0.0) == (hertz[0] > 4.0)
+            assert (minimum(scaled_stiffness - floor) > 0.0) == (hertz[0] > 4.0)
         if abs(hertz[-1] / 16.0 - 1.0) > 1e-3:
-            assert (minimum(ceiling - own) > 0.0) == (hertz[-1] < 16.0)
+            assert (minimum(ceiling - scaled_stiffness) > 0.0) == (hertz[-1] < 16.0)
         seen.add((bool(hertz[0] > 4.0), bool(hertz[-1] < 16.0)))
     assert len(seen) >= 2
 

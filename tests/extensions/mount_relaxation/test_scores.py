@@ -74,10 +74,10 @@ min = "1.5 Hz"
 def test_one_half_of_the_motions_may_have_no_open_springs() -> None:
     """Check a half of upright motions with given stiffness alone."""
     problem = load(tomllib.loads(SIDEWAYS))
-    result, given = solve(problem), evaluate(problem)
+    result, initial = solve(problem), evaluate(problem)
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
-    others = [with_mounts(given, problem.design([x])) for x in np.geomspace(47e3, 940e3, 30)]
+    others = [with_mounts(initial, problem.design([x])) for x in np.geomspace(47e3, 940e3, 30)]
     minimum = min(objective_value(problem, each) for each in others if each.violation(problem.limits) <= 0.0)
     assert result.certificate.lower_bound <= minimum
     assert result.objective is not None

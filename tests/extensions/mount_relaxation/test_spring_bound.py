@@ -543,11 +543,11 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     problem = replace(load(powertrain("2 4", "7 Hz", 6) | {"search": {"starts": 1}}), tolerance=1e-3)
     result = solve(problem)
     assert result.certificate is not None
-    bound, given = result.certificate.lower_bound, evaluate(problem)
+    bound, initial = result.certificate.lower_bound, evaluate(problem)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
 
     def worth(s: np.ndarray) -> float:
-        each = with_mounts(given, problem.design(np.clip(low * (high / low) ** s, low, high).tolist()))
+        each = with_mounts(initial, problem.design(np.clip(low * (high / low) ** s, low, high).tolist()))
         return objective_value(problem, each) * (1.0 + 100.0 * max(each.violation(problem.limits), 0.0))
 
     best = np.log(np.array([decision.value for decision in result.decisions]) / low) / np.log(high / low)

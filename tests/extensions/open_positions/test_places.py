@@ -136,10 +136,10 @@ class TestAgainstClosedForms:
         assert result.certificate.kind is Proof.GLOBAL
         places = [d for d in problem.decisions if d.place_drives]
         level = problem.design([0.0] * len(places), places)
-        beside = laufruhe.solve(_held(problem, level))
+        level_result = laufruhe.solve(_held(problem, level))
         assert result.objective is not None
-        assert beside.objective is not None
-        assert result.objective.value < 0.98 * beside.objective.value
+        assert level_result.objective is not None
+        assert result.objective.value < 0.98 * level_result.objective.value
 
 
 def _held(problem: Problem, engine: Engine) -> Problem:
@@ -342,8 +342,8 @@ def test_distances_by_hand(tmp_path: Path) -> None:
         text += f'[[constraints]]\nlimit = {quantity}\nmin = "0 mm"\n'
     text += '[[constraints]]\nlimit = "envelope radius"\nof = ["other"]\nmax = "1 m"\n'
     problem = _problem(tmp_path, text)
-    given = evaluate(problem)
-    found = [list(given.values(limit.measure)) for limit in problem.limits]
+    initial = evaluate(problem)
+    found = [list(initial.values(limit.measure)) for limit in problem.limits]
     assert found[0] == pytest.approx([0.05])
     assert found[1] == pytest.approx([0.05 - 0.03 - 0.045])
     assert sorted(found[2]) == pytest.approx([0.05, np.hypot(0.05, 0.04), 0.08])

@@ -84,18 +84,18 @@ SPEEDS = [{"name": "loud", "speed": "2400 rpm", "weight": 3}, {"name": "calm", "
 
 def two_speeds(quantity: str) -> Problem:
     """Return a problem of two operating points, each with its own gas."""
-    own = problem(quantity, between(5, 40), operating_points=SPEEDS)
-    loud, calm = own.points
-    return replace(own, points=(loud, replace(calm, gas=replace(calm.gas, peak_pressure=60e5, imep=3e5))))
+    variant = problem(quantity, between(5, 40), operating_points=SPEEDS)
+    loud, calm = variant.points
+    return replace(variant, points=(loud, replace(calm, gas=replace(calm.gas, peak_pressure=60e5, imep=3e5))))
 
 
 @pytest.mark.parametrize("norm", ["rms", "mean", "maximum", "peak to peak"])
 def test_a_torque_changes_a_norm_by_no_more_than_its_bound(norm: str) -> None:
     """Compare the bound with the norm of a torque at one point or both, without another load."""
-    own = two_speeds(f"{norm} roll moment")
-    (measure,), random = own.measures, np.random.default_rng(4)
-    boxes, weights = SharedGasBoxes(own), (0.75, 0.25)
-    assert measure.shares(own.points) == pytest.approx(weights)
+    variant = two_speeds(f"{norm} roll moment")
+    (measure,), random = variant.measures, np.random.default_rng(4)
+    boxes, weights = SharedGasBoxes(variant), (0.75, 0.25)
+    assert measure.shares(variant.points) == pytest.approx(weights)
     for times in ((1.0, 0.0), (0.0, 1.0), (0.3, 2.0)):
         changes = [time * np.abs(random.normal(size=CELLS)) for time in times]
         torques = [np.where(random.random(CELLS) < 0.5, -each, each) for each in changes]
@@ -114,12 +114,12 @@ def test_a_torque_changes_a_norm_by_no_more_than_its_bound(norm: str) -> None:
 @pytest.mark.parametrize("quantity", ["rms mount force", "maximum roll moment", "peak to peak mount force"])
 def test_no_lead_of_a_box_is_under_its_bound(quantity: str) -> None:
     """Check bounds of boxes, which are tight for narrow ones."""
-    own = two_speeds(quantity)
-    boxes = SharedGasBoxes(own)
+    variant = two_speeds(quantity)
+    boxes = SharedGasBoxes(variant)
     for middle, half in ((10.0, 1.0), (25.0, 8.0), (30.0, 0.01)):
         low, high = math.radians(middle - half), math.radians(middle + half)
         bound = float(boxes.bounds(np.array([[low]]), np.array([[high]]))[0][0])
-        values = [objective_value(own, evaluate(own, own.design([x]))) for x in np.linspace(low, high, 5)]
+        values = [objective_value(variant, evaluate(variant, variant.design([x]))) for x in np.linspace(low, high, 5)]
         assert bound <= min(values) * (1.0 + 1e-9)
         if half < 0.1:
             assert bound > 0.97 * min(values)
@@ -149,8 +149,8 @@ def test_no_lead_is_better_than_the_bound(name: str) -> None:
     if own.search.boxes is None:
         assert str(result.certificate.kind) == "global"
     lead = math.degrees(result.decisions[0].value)
-    given = problem("rms roll moment", lead, engine={"crank_ratio": int(own.engine.shafts[1].ratio)})
-    again = replace(given, objective=own.objective)
+    variant = problem("rms roll moment", lead, engine={"crank_ratio": int(own.engine.shafts[1].ratio)})
+    again = replace(variant, objective=own.objective)
     assert objective_value(own, evaluate(again)) == pytest.approx(result.objective.value, rel=1e-9)
 
 
@@ -158,12 +158,12 @@ def test_no_lead_is_better_than_the_bound(name: str) -> None:
 def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
     """Check the least roll moment under a limit on the force, and a limit that no lead keeps."""
     force = [{"limit": "rms shaking force", "max": "300 N"}]
-    own = problem("rms roll moment", between(0, 40), constraints=force)
-    result = laufruhe.solve(own)
+    variant = problem("rms roll moment", between(0, 40), constraints=force)
+    result = laufruhe.solve(variant)
     assert result.limits[0].value == pytest.approx(300.0, rel=1e-3)
     assert result.limits[0].value <= 300.0 * (1.0 + 1e-6)
     assert str(result.certificate.kind) == "global"
-    maximum = objective_value(own, evaluate(own, own.design([math.radians(40.0)])))
+    maximum = objective_value(variant, evaluate(variant, variant.design([math.radians(40.0)])))
     none = [{"limit": "rms roll moment", "max": f"{0.9 * maximum} N m"}]
     assert str(laufruhe.solve(problem("rms shaking force", between(0, 40), constraints=none)).status) == "infeasible"
 

@@ -109,8 +109,10 @@ def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result
     assert actual.max() <= worst(result) * (1.0 + 1e-12)
     assert actual.max() > 0.97 * worst(result)
     for k in (*range(0, 10_000, 2_000), int(np.argmax(actual))):
-        own = with_errors(problem, many[k])
-        assert objective_value(own, evaluate(own, own.design(values))) == pytest.approx(actual[k], rel=1e-10)
+        built_problem = with_errors(problem, many[k])
+        assert objective_value(built_problem, evaluate(built_problem, built_problem.design(values))) == pytest.approx(
+            actual[k], rel=1e-10
+        )
 
 
 def test_no_other_design_is_better(read: Callable[[str], Problem]) -> None:
@@ -249,9 +251,9 @@ def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None
     )
     assert result.limits[0].shadow_price == pytest.approx((narrow - wide) / 60.0, rel=0.05, abs=1e-6)
     for z in itertools.product((-1.0, 1.0), repeat=6):
-        own = with_errors(tight, np.array(z))
-        design = own.design(turned([d.value for d in result.decisions]))
-        assert evaluate(own, design).value(tight.limits[0].measure) <= 1900.0 * (1.0 + 1e-5)
+        built_problem = with_errors(tight, np.array(z))
+        design = built_problem.design(turned([d.value for d in result.decisions]))
+        assert evaluate(built_problem, design).value(tight.limits[0].measure) <= 1900.0 * (1.0 + 1e-5)
     none = solve(read((TEXT + ROBUST + limit.format("200 N")).replace('operating_points = ["2500 rpm"]\n', "")))
     assert "no design exists" in none.message
 
@@ -335,8 +337,10 @@ def test_crossed(read: Callable[[str], Problem], text: str) -> None:
     assert result.certificate.kind is Proof.GLOBAL
     values = unbalance_values(problem, result)
     for z in tolerances_of(problem).draw(np.random.default_rng(4), 200):
-        own = with_errors(problem, z)
-        value = objective_value(own, evaluate(own, own.design(values), result.final.samples))
+        built_problem = with_errors(problem, z)
+        value = objective_value(
+            built_problem, evaluate(built_problem, built_problem.design(values), result.final.samples)
+        )
         assert value <= worst(result) * (1.0 + 1e-9)
 
 

@@ -37,8 +37,8 @@ def problem(**changes: Any) -> Problem:
 
 def heaviest(nominal: Problem) -> float:
     """Return the objective of the engine with the heaviest piston, the worst one, at many angles."""
-    own = with_errors(nominal, np.ones(tolerances_of(nominal).count))
-    return objective_value(own, evaluate(own, samples=5760))
+    built_problem = with_errors(nominal, np.ones(tolerances_of(nominal).count))
+    return objective_value(built_problem, evaluate(built_problem, samples=5760))
 
 
 @pytest.mark.parametrize("weights", [[], [WEIGHT]], ids=["nothing open", "a weight"])

@@ -125,10 +125,12 @@ def test_built_engines_stay_within_the_worst_sum() -> None:
     random = np.random.default_rng(5)
     drawn = shaking_loads(engine, point).sample(360)
     for _ in range(20):
-        own = built(engine, tolerances, random)
-        added = (shaking_loads(own, point).sample(360) - drawn)[:, 1:3]
+        built_engine = built(engine, tolerances, random)
+        added = (shaking_loads(built_engine, point).sample(360) - drawn)[:, 1:3]
         assert 0.0 < float(np.hypot(*added.T).max()) < worst
-        assert [rotor.x for rotor in own.rotors[len(engine.rotors) :]] == pytest.approx([0.125, 0.0, -0.125, -0.125])
+        assert [rotor.x for rotor in built_engine.rotors[len(engine.rotors) :]] == pytest.approx(
+            [0.125, 0.0, -0.125, -0.125]
+        )
 
 
 def test_no_tolerances_build_the_drawing() -> None:

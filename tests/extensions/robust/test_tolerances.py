@@ -53,8 +53,8 @@ def test_forms(tmp_path: Path, words: str, size: float, law: Law, scope: Scope) 
 
 def test_errors_move_what_they_are_of(tmp_path: Path) -> None:
     problem = read(tmp_path, TEXT.format(" ± 25 g") + MOUNTS)
-    own = with_errors(problem, np.array([1.0, -1.0, 0.0, 0.5]))
-    masses = [part.reciprocating_mass for part in own.engine.slider_cranks]
+    built_problem = with_errors(problem, np.array([1.0, -1.0, 0.0, 0.5]))
+    masses = [part.reciprocating_mass for part in built_problem.engine.slider_cranks]
     assert masses == pytest.approx([1.275, 1.225, 1.25, 1.2625])
     batch = with_errors(read(tmp_path, TEXT.format(" ± 25 g batch") + MOUNTS), np.array([-1.0]))
     assert [part.reciprocating_mass for part in batch.engine.slider_cranks] == pytest.approx([1.225] * 4)
@@ -65,8 +65,8 @@ def test_open_unbalances_are_off_by_a_share(tmp_path: Path) -> None:
         "left", 2, "0 mm", 'unbalance = { between = ["0 kg m", "0.05 kg m"], tolerance = "2 %" }\nangle = 90'
     )
     problem = read(tmp_path, TEXT.format("") + MOUNTS + weight)
-    own = with_errors(problem, np.array([1.0]))
-    assert own.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.0408j)
+    built_problem = with_errors(problem, np.array([1.0]))
+    assert built_problem.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.0408j)
     assert problem.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.04j)
 
 
@@ -136,10 +136,12 @@ def test_grades(tmp_path: Path) -> None:
     problem = read(tmp_path, text)
     (tolerance,) = tolerances_of(problem).tolerances
     assert tolerance.size == pytest.approx(0.5 * 60.0 * 20.05e-6, rel=1e-3)
-    own = with_errors(problem, np.array([0.0, 1.0, -1.0, 0.0]))
-    assert [rotor.unbalance for rotor in own.engine.rotors] == pytest.approx([1j * tolerance.size, -tolerance.size])
-    assert [rotor.x for rotor in own.engine.rotors] == pytest.approx([0.1875, -0.1875])
-    assert objective_value(own, evaluate(own)) != objective_value(problem, evaluate(problem))
+    built_problem = with_errors(problem, np.array([0.0, 1.0, -1.0, 0.0]))
+    assert [rotor.unbalance for rotor in built_problem.engine.rotors] == pytest.approx(
+        [1j * tolerance.size, -tolerance.size]
+    )
+    assert [rotor.x for rotor in built_problem.engine.rotors] == pytest.approx([0.1875, -0.1875])
+    assert objective_value(built_problem, evaluate(built_problem)) != objective_value(problem, evaluate(problem))
 
 
 @pytest.mark.parametrize(

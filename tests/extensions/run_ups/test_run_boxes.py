@@ -427,11 +427,11 @@ def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
     result = laufruhe.solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
     assert "run-ups" in result.certificate.method
-    given, r = evaluate(problem), np.random.default_rng(2)
+    initial, r = evaluate(problem), np.random.default_rng(2)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     feasible = met = 0
     for x in low + (high - low) * r.random((50, len(low))):
-        design = with_mounts(given, problem.design(x.tolist()))
+        design = with_mounts(initial, problem.design(x.tolist()))
         met += design.value(OF_RUNS[1]) > 1.1e-3
         if design.violation(problem.limits) <= 0.0:
             feasible += 1
@@ -459,10 +459,10 @@ def test_no_design_of_a_grid_is_under_the_bound(
     """
     settings: dict[str, Any] = {"objective": {"minimise": objective}, "search": {"starts": 1}}
     bare = random_problem(seed, **settings)
-    given = evaluate(bare)
+    initial = evaluate(bare)
     r = np.random.default_rng(seed)
     low, high = (np.array([getattr(d, side) for d in bare.mount_decisions]) for side in ("lower", "upper"))
-    designs = [with_mounts(given, bare.design(x.tolist())) for x in low + (high - low) * r.random((100, len(low)))]
+    designs = [with_mounts(initial, bare.design(x.tolist())) for x in low + (high - low) * r.random((100, len(low)))]
     problem = bare
     if limit is not None:
         name, unit, scale = limit

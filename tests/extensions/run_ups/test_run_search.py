@@ -144,9 +144,9 @@ def test_run_up_peaks_and_slopes_are_those_of_the_exact_model() -> None:
     }
     shaft = tables_of(PROBLEMS / "soft-single-run-up.toml")["balancer_shafts"]
     for stop, error in ((None, 1e-4), (STOP, 2e-3)):
-        given = mounts(stop)
-        given["places"][0] |= opened
-        problem = limited(mounts=given, balancer_shafts=shaft)
+        mount_table = mounts(stop)
+        mount_table["places"][0] |= opened
+        problem = limited(mounts=mount_table, balancer_shafts=shaft)
         unbalance, mount_numbers = 0.004 + 0.003j, [1.2e-3, 0.21]
         order = [d.name.split(".")[1] for d in problem.mount_decisions]
         numbers = dict(zip(("damping_per_stiffness", "position"), mount_numbers, strict=True))
@@ -172,12 +172,12 @@ def test_run_up_peaks_and_slopes_are_those_of_the_exact_model() -> None:
 @pytest.mark.parametrize("stop", [None, STOP])
 def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
     """Check that a run that ends near a resonance has its largest motion there, in search and exact model."""
-    given = mounts(stop)
-    given["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
+    mount_table = mounts(stop)
+    mount_table["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
     at_ends = 0
     for speed in range(360, 480, 10):
         run = {"up_to": f"{speed} rpm", "time": "0.3 s", "shut_down_time": "0.3 s"}
-        problem = limited(mounts=given, run_up=run)
+        problem = limited(mounts=mount_table, run_up=run)
         runs = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
         peaks = RunPeaks(problem, OF_RUNS[:1])
         for values, own in zip(np.split(peaks.values(np.array([1e-3])), 2), runs, strict=True):
@@ -192,17 +192,17 @@ def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
 @pytest.mark.slow
 def test_a_design_of_which_one_run_is_not_followed_has_no_peaks() -> None:
     """Check that stops of 30 kN/mm, too stiff for the steps of one run, leave no peaks of either."""
-    given = mounts({**STOP, "stiffness": "30000 N/mm"})
-    given["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
+    mount_table = mounts({**STOP, "stiffness": "30000 N/mm"})
+    mount_table["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
     run = {"up_to": "300 rpm", "time": "0.05 s", "shut_down_time": "1.5 s"}
-    peaks = RunPeaks(limited(mounts=given, run_up=run), OF_RUNS)
+    peaks = RunPeaks(limited(mounts=mount_table, run_up=run), OF_RUNS)
     values, slopes = peaks.values(np.array([1e-3])), peaks.slopes(np.array([1e-3]))
     assert values.shape == (sum(peaks.counts),)
     assert slopes.shape == (sum(peaks.counts), 1)
     assert np.isnan(values).all()
     assert np.isnan(slopes).all()
     # the shorter run alone is followed
-    shorter = RunPeaks(limited(mounts=given, run_up={**run, "shut_down_time": "0.05 s"}), OF_RUNS)
+    shorter = RunPeaks(limited(mounts=mount_table, run_up={**run, "shut_down_time": "0.05 s"}), OF_RUNS)
     assert np.isfinite(shorter.values(np.array([1e-3]))).all()
 
 
@@ -219,13 +219,13 @@ def test_runs_on_bump_stops_are_those_of_scipy() -> None:
 @pytest.mark.slow
 def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
     """Check that every better stiffness of a row of 40 breaks the limit, and compare the peak force with SciPy."""
-    given = mounts(STOP)
-    given["places"][2]["stiffness"] = [
+    mount_table = mounts(STOP)
+    mount_table["places"][2]["stiffness"] = [
         "120 N/mm",
         "120 N/mm",
         {"between": ["60 N/mm", "400 N/mm"], "start": "300 N/mm"},
     ]
-    problem = limited(("run-up force", "420 N"), mounts=given, objective={"minimise": "static sag"})
+    problem = limited(("run-up force", "420 N"), mounts=mount_table, objective={"minimise": "static sag"})
     result = laufruhe.solve(problem)
     assert result.status is Status.FEASIBLE
     assert result.certificate.kind is Proof.LOCAL
@@ -284,13 +284,13 @@ def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
     minimum = {"minimise": "run-up force"}
     # a mount of its own under the weight of the block
-    given = mounts()
-    given["places"][2]["stiffness"] = [
+    mount_table = mounts()
+    mount_table["places"][2]["stiffness"] = [
         "120 N/mm",
         "120 N/mm",
         {"between": ["60 N/mm", "400 N/mm"], "start": "300 N/mm"},
     ]
-    settings = {"mounts": given, "objective": minimum, "search": {"starts": 1, "boxes": 1}}
+    settings = {"mounts": mount_table, "objective": minimum, "search": {"starts": 1, "boxes": 1}}
     mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), **settings))
     both = laufruhe.solve(limited(("static sag", "5 mm"), counterweights=[weight], **settings))
     assert both.objective.value < mounts_alone.objective.value < mounts_alone.objective.initial
@@ -307,14 +307,16 @@ def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
 @pytest.mark.slow
 def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
     """Check that a search with all features together keeps limits that the initial design breaks."""
-    given = mounts()
+    mount_table = mounts()
     opened = {"between": ["60 N/mm", "600 N/mm"], "start": "200 N/mm"}
-    given["places"][0]["stiffness"] = ["120 N/mm", "120 N/mm", opened]
-    given["places"][2] |= {"fluid_track": {"mass": "25 kg", "bulge_stiffness": "260 N/mm", "damping": "500 N s/m"}}
+    mount_table["places"][0]["stiffness"] = ["120 N/mm", "120 N/mm", opened]
+    mount_table["places"][2] |= {
+        "fluid_track": {"mass": "25 kg", "bulge_stiffness": "260 N/mm", "damping": "500 N s/m"}
+    }
     points = [{"name": "idle", "speed": "900 rpm"}, {"name": "rated", "speed": "1500 rpm"}]
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
     problem = limited(
-        ("run-up travel", "11 mm"), ("static travel", "12 mm"), mounts=given, operating_points=points,
+        ("run-up travel", "11 mm"), ("static travel", "12 mm"), mounts=mount_table, operating_points=points,
         gas={"model": "seiliger", "peak_pressure": "55 bar", "imep": "3 bar"}, counterweights=[weight],
         load_cases=[{"name": "pot hole", "times_weight": [0, 0, -3]}], search={"starts": 1, "boxes": 1},
     )  # fmt: skip

@@ -74,8 +74,8 @@ def test_the_best_sizes_with_the_best_weights_are_proven(solved: Result) -> None
 def test_at_its_sizes_the_cone_program_finds_the_same(solved: Result, problem: Problem) -> None:
     found = {entry.name: entry.value for entry in solved.decisions}
     sizes = np.array([found[d.name] for d in problem.decisions if d not in problem.unbalances])
-    own = solve_unbalances(held(problem, sizes))
-    assert own.objective.value == pytest.approx(solved.objective.value, rel=1e-6)
+    solution = solve_unbalances(held(problem, sizes))
+    assert solution.objective.value == pytest.approx(solved.objective.value, rel=1e-6)
     # and no box around them alone has a bound beyond it
     model = SizeModel(problem)
     boxes = SizeBoxes(model, solve_cone_program)
@@ -216,8 +216,8 @@ def test_a_weight_beside_the_length_of_the_rod_is_proven() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value < 0.9 * without.objective.value
     problem = result.problem
-    own = solve_unbalances(held(problem, np.array([entry.value for entry in result.decisions[1:]])))
-    assert own.objective.value == pytest.approx(result.objective.value, rel=1e-6)
+    solution = solve_unbalances(held(problem, np.array([entry.value for entry in result.decisions[1:]])))
+    assert solution.objective.value == pytest.approx(result.objective.value, rel=1e-6)
 
 
 def test_a_stress_itself_may_be_minimised() -> None:
