@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 LONG = Path(__file__).with_name("long.txt")
-"""Costly tests of `make test-long`, each with what of `make test` shows the same: a test, or so many of its cases."""
+"""Costly tests of `make test-long`, each with the test, or the number of cases, of `make test` that shows the same."""
 
 
 def long_and_shorter() -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Order coefficients in 50 digits: what the closed forms are held to at the extremes."""
+"""Order coefficients in 50 digits, the reference of the closed forms at the extremes."""
 
 from __future__ import annotations
 

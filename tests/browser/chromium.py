@@ -1,4 +1,4 @@
-"""The distribution's Chromium, driven by Playwright, and what pages that it shows are asked."""
+"""The distribution's Chromium, driven by Playwright, and questions to the pages that it shows."""
 
 from __future__ import annotations
 

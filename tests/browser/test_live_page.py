@@ -1,4 +1,4 @@
-"""The live page in a browser: its numbers are those of the exact model, and its controls do what they say."""
+"""Live page in a browser: its numbers are those of the exact model, and its controls work."""
 
 from __future__ import annotations
 

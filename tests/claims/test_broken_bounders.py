@@ -1,4 +1,4 @@
-"""Bounders broken on purpose, one of each family: what they say of a known design gives them away."""
+"""Bounders broken on purpose, one of each family, which contradict a known design."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ BROKEN = {
     "places": ("tractor-four-shaft-heights", scaled(PlaceSearch, "box", bound_times(1.01))),
     "matrix inequalities": ("powertrain-torque-roll", scaled(ConvexProgram, "bound", first_times(1.001))),
 }
-"""A ready problem of a family, and what breaks its bounder."""
+"""Ready problem of a family, and the change that breaks its bounder."""
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Optional shafts beside throws that are given, and angles that cannot be open beside them."""
+"""Optional shafts with given throws, and angles that cannot be open then."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Prices of limits and bounds on either side, beside problems solved again with each moved both ways."""
+"""Prices of limits and bounds on either side, compared with problems solved again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Objectives in order: what is proven of all of them together, and first ones that cancel."""
+"""Objectives in order: the proof of all of them together, and first ones that cancel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bounds of loads whose gas has a spike of one sample, beside a crank written down here at many angles."""
+"""Bounds of loads under gas with a spike of one sample, compared with an independent crank at many angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A channel or a norm that no method and no bound names: nothing is claimed of designs that were not looked at."""
+"""Channel or norm unknown to all methods and bounds: no claims about designs that were not evaluated."""
 
 from __future__ import annotations
 

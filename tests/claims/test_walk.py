@@ -1,4 +1,4 @@
-"""A walk by exact evaluations takes back what a false bound claims, and nothing that is true."""
+"""Walk by exact evaluations, which withdraws claims of a false bound, and no true ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables in an order: what extensions add stands where it says."""
+"""Order of tables: additions of extensions stand where they say."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Without the folder of an extension the core imports, solves the same, and names what a file lacks."""
+"""Core without the folder of an extension: imports, equal solutions, and messages that name missing parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Damaged files through the commands, in processes of their own; whatever a command must never do is a finding."""
+"""Damaged files through the commands, in new processes; any forbidden behaviour is a finding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Damaged files by command, as many as asked for; writes results/faults/README.md with what was found.
+"""Damaged files by command, in any number; writes the findings to results/faults/README.md.
 
 python tests/faults/run_faults.py [FILES] [JOBS] [LOG]
 

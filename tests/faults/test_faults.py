@@ -1,4 +1,4 @@
-"""Damaged files: every command reads them or refuses them line by line; nothing else ever happens."""
+"""Damaged files: every command reads them or refuses them line by line."""
 
 from __future__ import annotations
 

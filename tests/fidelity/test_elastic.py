@@ -1,4 +1,4 @@
-"""Elastic mounts as a choice: estimates are bounds, what is left out is small, choices agree in their limits."""
+"""Fidelities of elastic mounts: estimates are bounds, omitted parts are small, choices agree in their limits."""
 
 from __future__ import annotations
 

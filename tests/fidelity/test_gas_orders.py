@@ -1,4 +1,4 @@
-"""Gas kept to an order of its own: inertia stays, and what is left out is bounded."""
+"""Gas cut off at an order of its own: inertia stays, and the omitted part is bounded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""[load_torque] of a problem file: periods, units, columns, and what is refused."""
+"""[load_torque] of a problem file: periods, units, columns, and refused input."""
 
 from __future__ import annotations
 

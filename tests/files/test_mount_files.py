@@ -1,4 +1,4 @@
-"""Elastic mounts in problem files: what is read, and what is refused in one clear line."""
+"""Elastic mounts in problem files: keys, and input that is refused in one clear line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Maker's numbers change names only: every layout, open cranks, bearings, torsion and gas; and what messages say."""
+"""Maker's numbers, which change names only: every layout, open cranks, bearings, torsion, gas; and messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Opposed pistons in a problem file: the same engine as its list of parts, and what such a file cannot say."""
+"""Opposed pistons in a problem file, compared with a list of parts, and refused input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rotating mass of a throw loads the bearings and no crank pin, whatever lists the slider-cranks."""
+"""Rotating mass of a throw, which loads the bearings and no crank pin, in every layout."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bad input: one line with file, key, value, rule and remedy, and nothing computed."""
+"""Bad input: one line with file, key, value, rule and remedy, before any computation."""
 
 from __future__ import annotations
 

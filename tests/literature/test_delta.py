@@ -1,4 +1,4 @@
-"""The Deltic of the textbook's Fig. 3.6: leads round the triangle, what they leave, and the rows that cancel it."""
+"""Deltic of the textbook's Fig. 3.6: leads round the triangle, remaining loads, and rows that cancel them."""
 
 from __future__ import annotations
 

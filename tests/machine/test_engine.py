@@ -1,4 +1,4 @@
-"""Engines that cannot exist are refused, in words that say what to change."""
+"""Engines that cannot exist, refused with a remedy."""
 
 from __future__ import annotations
 

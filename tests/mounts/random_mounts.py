@@ -1,4 +1,4 @@
-"""Random problems on elastic mounts, and a search that knows only the exact model to judge what is claimed of them."""
+"""Random problems on elastic mounts, and a search by the exact model that judges claims about them."""
 
 from __future__ import annotations
 

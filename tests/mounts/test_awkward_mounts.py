@@ -1,4 +1,4 @@
-"""Mounts on which a search or a bound goes astray: flanks of resonances, and what nothing open acts on."""
+"""Mounts that mislead a search or a bound: flanks of resonances, and terms without open numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limits that nothing open acts on hold for every design or for none, whatever else is open."""
+"""Limits without effect of any open number, which hold for every design or for none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A whole mechanism on the moving block: what the linear model leaves out, and how much that is.
+"""Mechanism on the moving block: the part that the linear model omits.
 
 The reference is nonlinear: block, crank, rod and piston as bodies of exudyn in the plane across the crank axis, the
 block on springs and dampers, the crank turned at constant speed. The linear model has one body of constant inertia

@@ -1,4 +1,4 @@
-"""A design as given on a resonance that nothing damps: refused itself, and left behind where mounts are open."""
+"""Initial design on an undamped resonance: refused itself, and left by a search of open mounts."""
 
 from __future__ import annotations
 

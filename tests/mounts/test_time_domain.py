@@ -1,4 +1,4 @@
-"""Integration in time against the frequency domain, and what only time can tell."""
+"""Integration in time, compared with the frequency domain, and effects that only time shows."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ LOG = MAP.with_name("mutants.jsonl")
 FEW = 10
 Key = tuple[str, str]
 Found = tuple[Mutant, str, int]
-"""A mutant, what became of it, and how many tests it passed."""
+"""Mutant, its fate, and the number of tests that it passed."""
 KILLED, SAME, SURVIVED, UNREACHED = "killed", "equivalent", "survived", "met no test"
 
 

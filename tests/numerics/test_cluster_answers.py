@@ -1,4 +1,4 @@
-"""Calls of a cluster whose answers cannot be fetched: they are lost, and asked for again; no cluster is needed."""
+"""Calls of a cluster whose answers are lost and requested again, without a cluster."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Folders that one process keeps to itself while it writes there."""
+"""Folders that one process locks while it writes there."""
 
 from __future__ import annotations
 

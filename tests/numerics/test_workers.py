@@ -1,4 +1,4 @@
-"""Pieces of work side by side: whoever does them, each is answered once, and a death costs only what it was at."""
+"""Pieces of work in parallel: each is answered once, and the death of a worker costs only its piece."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stars keep value and kind of proof when the engine is mirrored, reversed, told in another order or in other sizes."""
+"""Stars of mirrored, reversed, renumbered and rescaled engines, with equal value and kind of proof."""
 
 from __future__ import annotations
 

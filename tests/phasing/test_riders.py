@@ -1,4 +1,4 @@
-"""Columns of unbalances that ride on throws, or stand still, against the engine that the problem itself makes."""
+"""Columns of unbalances that turn with throws, or stand still, compared with the engine of the problem."""
 
 from __future__ import annotations
 

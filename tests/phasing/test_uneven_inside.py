@@ -1,4 +1,4 @@
-"""Loads inside the crankcase beside uneven throws that are open: sums of waves, bounds and designs against grids."""
+"""Loads inside the crankcase with open uneven throws: sums of waves, bounds and designs, compared with grids."""
 
 from __future__ import annotations
 

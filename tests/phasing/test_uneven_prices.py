@@ -1,4 +1,4 @@
-"""Shadow prices where throws may leave their even steps: what a limit costs while they move."""
+"""Shadow prices of limits with throws that may leave their even steps."""
 
 from __future__ import annotations
 

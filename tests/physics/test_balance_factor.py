@@ -1,4 +1,4 @@
-"""The balance factor (L9): what [[counterweights]] with one make, and what weights at other places come to."""
+"""Balance factor (L9) of [[counterweights]], and of weights at other places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mount forces far below resonance: equilibrium, compatibility, and loads that nothing carries."""
+"""Mount forces far below resonance: equilibrium, compatibility, and loads that no mount carries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise of a measured cycle: what is found, what is removed, and what is left as it is."""
+"""Noise of a measured cycle: detection, removal, and cycles that stay as they are."""
 
 from __future__ import annotations
 

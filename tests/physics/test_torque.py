@@ -1,4 +1,4 @@
-"""Torque of the crankshaft, what a flywheel stores, and how large it has to be."""
+"""Torque of the crankshaft, stored work of a flywheel, and its needed size."""
 
 from __future__ import annotations
 

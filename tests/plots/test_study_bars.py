@@ -1,4 +1,4 @@
-"""Pictures of study parts: what is on their axes, where points have no design or stand a factor apart."""
+"""Pictures of study parts: axes, points without a design, and points far apart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forces over a box of open numbers are within the bound of what their series leaves out (E37)."""
+"""Forces over a box of open numbers, compared with the remainder of their series (E37)."""
 
 from __future__ import annotations
 

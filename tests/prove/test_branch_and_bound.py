@@ -1,4 +1,4 @@
-"""The one loop that divides what is open, on functions whose least value is known."""
+"""Branch and bound on functions with a known minimum."""
 
 from __future__ import annotations
 

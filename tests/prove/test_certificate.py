@@ -1,4 +1,4 @@
-"""Lower bounds hold whatever multipliers a solver proposes; proofs of zero and of nothing."""
+"""Lower bounds for any multipliers of a solver, and proofs of zero and without loads."""
 
 from __future__ import annotations
 

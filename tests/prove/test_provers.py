@@ -1,4 +1,4 @@
-"""Provers of open mounts: asked alike, in rounds of growing work, until one closes."""
+"""Provers of open mounts, which work in rounds of growing effort until one closes the gap."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Folders of results: all old or all new after a kill at any moment, and nothing of others lost."""
+"""Folders of results: all old or all new after a kill at any moment, with files of others untouched."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables and curves as CSV and as a workbook: the numbers of the result, and nothing else."""
+"""Tables and curves as CSV and as a workbook, compared with the numbers of the result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`read_result`: what `result.json` was written from is what is read back."""
+"""`read_result`, compared with the result behind `result.json`."""
 
 from __future__ import annotations
 

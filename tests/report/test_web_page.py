@@ -1,4 +1,4 @@
-"""The page of a report: one file that loads nothing, read by eyes, by ear and on paper."""
+"""Page of a report: one file that loads no others, for screens, screen readers and paper."""
 
 from __future__ import annotations
 

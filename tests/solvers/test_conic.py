@@ -1,4 +1,4 @@
-"""The cone program against the same one stated in cvxpy, and what is made of a solver that stops without an answer."""
+"""Cone program, compared with the same one in cvxpy, and with a solver that stops without an answer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Means at few angles may be more than over the cycle: what they forbid is no proof that there is no design (P7)."""
+"""Means at few angles above those of the cycle, which prove no infeasibility (P7)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nonlinear runner: known optima, judged by optimality conditions that it did not compute itself."""
+"""Nonlinear runner: known optima, judged by independent optimality conditions."""
 
 from __future__ import annotations
 

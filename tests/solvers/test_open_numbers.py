@@ -1,4 +1,4 @@
-"""Any number of the file open: optima against a model of its own, what follows in the file, and what stays closed."""
+"""Any open number of the file: optima, compared with independent models, dependent keys, and keys that stay closed."""
 
 from __future__ import annotations
 

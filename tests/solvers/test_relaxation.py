@@ -1,4 +1,4 @@
-"""Bounds of a problem without some limits, beside designs and bounds of a method that knows all limits (P18)."""
+"""Bounds of a problem without some limits, compared with designs and bounds under all limits (P18)."""
 
 from __future__ import annotations
 

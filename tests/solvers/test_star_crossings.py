@@ -1,4 +1,4 @@
-"""Open cranks and shafts beside what no method of stars knows: each star by itself, and as good as each given."""
+"""Open cranks and shafts with parts that no method of stars knows, compared with each star given by itself."""
 
 from __future__ import annotations
 

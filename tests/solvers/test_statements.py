@@ -1,4 +1,4 @@
-"""Problems as other libraries state them: xarray, cvxpy, CasADi, scipy; and proofs of what these find."""
+"""Problems stated by other libraries (xarray, cvxpy, CasADi, scipy), and proofs of their solutions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Objectives of zero, of several units, and problems that leave nothing open."""
+"""Objectives of zero, of several units, and problems without open numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""CasADi is loaded where something open needs it, and what needs it says so where it is missing."""
+"""CasADi, loaded only for open numbers that need it, and a message where it is missing."""
 
 from __future__ import annotations
 

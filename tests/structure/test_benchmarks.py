@@ -1,4 +1,4 @@
-"""Scripts that nothing but `make benchmarks` runs still find what they import, and end as they should."""
+"""Benchmark scripts: their imports, and their end after failures."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""The list of slow tests is written from what a run measured, and no further than that run went."""
+"""List of slow tests, written from the times of a run, for the tests of that run alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Studies killed at random moments, alone and two at once, and what they kept damaged in between."""
+"""Studies killed at random moments, alone and two at once, with stored points damaged in between."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study on a Dask cluster has the numbers of one process, whatever is killed in between."""
+"""Study on a Dask cluster, compared with one process, with workers killed in between."""
 
 from __future__ import annotations
 

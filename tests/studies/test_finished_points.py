@@ -1,4 +1,4 @@
-"""Kept points of a study: what is damaged is solved again, never trusted, and never in the way."""
+"""Stored points of a study: damaged ones are solved again, never trusted, and block no run."""
 
 from __future__ import annotations
 

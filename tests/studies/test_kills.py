@@ -1,4 +1,4 @@
-"""A study that is killed at any moment goes on, whatever became of what it kept; its results are those of one run."""
+"""Study that is killed at any moment, goes on with damaged points, and has the results of one run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random studies of ready problems: each is computed, told and drawn, and a point is what its problem alone gives."""
+"""Random studies of ready problems: points, tables and pictures, compared with single problems."""
 
 from __future__ import annotations
 

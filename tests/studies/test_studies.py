@@ -1,4 +1,4 @@
-"""Studies: what each kind computes, and that stops, cores and leftovers change nothing of it."""
+"""Studies: results of each kind, independent of stops, cores and leftovers."""
 
 from __future__ import annotations
 

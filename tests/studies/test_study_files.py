@@ -1,4 +1,4 @@
-"""Study files: what is refused, in one line and before anything is computed or written."""
+"""Study files: input that is refused in one line before any computation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers where others break: every entry beside 50-digit arithmetic or an analytic limit.
+"""Extreme numbers, compared with 50-digit arithmetic or an analytic limit.
 
 `tests/benchmarks/bench_extremes.py` writes them to results/benchmarks/extremes.md; the tests hold every entry to what
 it guarantees.

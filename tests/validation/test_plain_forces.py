@@ -1,4 +1,4 @@
-"""Mount forces beside closed forms in plain NumPy at the same crank angles."""
+"""Mount forces, compared with closed forms in plain NumPy at the same crank angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers that no usual engine has are asked about, and nothing stops for them."""
+"""Warnings about numbers that no usual engine has, which stop no command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cards of bob weights against what shops print."""
+"""Cards of bob weights, compared with those that shops print."""
 
 from __future__ import annotations
 

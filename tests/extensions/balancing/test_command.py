@@ -1,4 +1,4 @@
-"""The command that balances: what it writes, what it prints, and what it refuses."""
+"""The command that balances: files, printed text, and refused input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Economics from study files: results, and what bad files are told."""
+"""Economics from study files: results, and messages for bad files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The automatic choice: what it leaves out, and that its estimate is not below its error."""
+"""The automatic choice: omitted parts, and an estimate that is not below the error."""
 
 from __future__ import annotations
 

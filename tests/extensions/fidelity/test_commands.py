@@ -1,4 +1,4 @@
-"""`explain` and `trade`: what they print and write."""
+"""`explain` and `trade`: printed text and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Choices of elastic mounts: estimates are bounds, and what is left out is small."""
+"""Choices of elastic mounts: estimates are bounds, and omitted parts are small."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Objectives in order: each rank is proven under those before it, and what they leave equal is named.
+"""Objectives in order: each rank is proven under the earlier ones, and equal optima are named.
 
 The singles are those of the textbook's chapter 3: Fig. 3.3 (road roller), Fig. 3.4 (bob weights), and a weight and a
 counter shaft that share the first order between them.

@@ -1,4 +1,4 @@
-"""The store of many draws: what is damaged is worked out again, never trusted, and never in the way."""
+"""Store of many draws: damaged pieces are computed again, never trusted, and block no run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many draws: each by itself is what the exact model and `solve` say of it, in whatever pieces they are drawn."""
+"""Many draws, compared one by one with the exact model and `solve`, in pieces of any size."""
 
 from __future__ import annotations
 

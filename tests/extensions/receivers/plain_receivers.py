@@ -1,4 +1,4 @@
-"""Random problems with receivers, and what is felt in a design: from its mount forces over the cycle, by own formulas.
+"""Random problems with receivers, and their responses from mount forces over the cycle, by independent formulas.
 
 Forces of the package are sampled over the cycle, transformed, multiplied by transfer functions, and summed back.
 A frame is that of `two_bodies`, and weightings follow from their formulas in f.

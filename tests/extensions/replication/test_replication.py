@@ -1,4 +1,4 @@
-"""Replications: the language of their files, what they keep and judge, and the ready ones."""
+"""Replications: the language of their files, their results and verdicts, and the ready ones."""
 
 from __future__ import annotations
 

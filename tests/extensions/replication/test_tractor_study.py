@@ -1,4 +1,4 @@
-"""Hasselgruber 1964, figure by figure: what the study file says is computed, judged and drawn."""
+"""Hasselgruber 1964, figure by figure: the study file is computed, judged and drawn."""
 
 from __future__ import annotations
 

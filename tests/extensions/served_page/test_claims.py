@@ -25,7 +25,7 @@ from problem_files import PROBLEMS
 INPUTS = Path(__file__).parent / "inputs"
 OPEN_CRANK = Edit("open crank", "crank", 1)
 STRONG = ("optimum", "no design", "proven", "gap", "bound", "least")
-"""Words that only the whole problem may be told with."""
+"""Words that are reserved for claims about the whole problem."""
 
 
 def follow(path: Path, *edits: Edit, held: tuple[Edit, ...] = (), position: int = 0) -> dict[str, Any]:

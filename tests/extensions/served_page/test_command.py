@@ -1,4 +1,4 @@
-"""The command that serves a page: what it refuses, what it prints, and how it ends."""
+"""The command that serves a page: refused input, printed text, and its end."""
 
 from __future__ import annotations
 

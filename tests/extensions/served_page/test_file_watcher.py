@@ -1,4 +1,4 @@
-"""A file that changes under a page: the last good state stays, and the line that is wrong is told."""
+"""File that changes under a page: the last good state stays, and the wrong line is named."""
 
 from __future__ import annotations
 

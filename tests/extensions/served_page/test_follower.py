@@ -1,4 +1,4 @@
-"""The optimum that follows a limit: bounded, never above what the whole solve finds, and no worse with more room."""
+"""Optimum that follows a limit: bounded, never above the whole solve, and no worse with more room."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Test the model of a page: its loads, its file of a design, and sentences on what does not move."""
+"""Model of a page: its loads, its file of a design, and sentences on fixed numbers."""
 
 from __future__ import annotations
 

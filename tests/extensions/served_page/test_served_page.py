@@ -1,4 +1,4 @@
-"""The served page in a browser: the optimum follows, what cannot be is said, and it outlives its server."""
+"""Served page in a browser: the optimum follows, infeasible limits are named, and the page outlives its server."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Study parts of free forces: their files and what they say."""
+"""Study parts of free forces: files and texts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Swinging yoke: loads from places of its masses alone, its orders in closed form, and what cannot turn."""
+"""Swinging yoke: loads from places of its masses, orders in closed form, and mechanisms that cannot turn."""
 
 from __future__ import annotations
 
