@@ -24,15 +24,15 @@ def test_numbers_are_those_of_the_exact_model(page: Page, tmp_path, name):
     model = model_of(problem)
     page.goto(page_of(problem, tmp_path).as_uri())
     for values in designs(model, 4):
-        shown = {each["name"]: each["value"] for each in page.evaluate(MEASURES, values)}
+        live_page = {each["name"]: each["value"] for each in page.evaluate(MEASURES, values)}
         result = evaluated(problem, model, values)
         if problem.objective:
-            assert shown["objective"] == pytest.approx(objective_value(problem, result), rel=1e-11)
+            assert live_page["objective"] == pytest.approx(objective_value(problem, result), rel=1e-11)
         exact_limits = {name for name, _ in model.without_slider}
         for limit in problem.limits:
             if limit.name not in exact_limits:
                 value = result.check_limit(limit).value
-                assert shown[limit.name] == pytest.approx(value, rel=1e-11, abs=1e-12)
+                assert live_page[limit.name] == pytest.approx(value, rel=1e-11, abs=1e-12)
     assert page.evaluate("laufruheLive.page.then(page => page.checked)") < 1e-11
 
 
@@ -47,34 +47,36 @@ def every(browser: Browser, tmp_path_factory):
 
 
 @pytest.fixture
-def shown(every: Page):
+def live_page(every: Page):
     every.evaluate("laufruheLive.page.then(page => (page.set(page.given), page.drawNow()))")
     return every
 
 
 @pytest.mark.parametrize("width", [420, 500, 700, 1280])
-def test_paths_of_all_mounts_are_of_one_size(shown, width):
+def test_paths_of_all_mounts_are_of_one_size(live_page, width):
     """Check equal sizes of all paths, also in a last row with fewer."""
-    usual = shown.viewport_size
-    shown.set_viewport_size({"width": width, "height": 900})
-    widths = shown.evaluate("[...document.querySelectorAll('.live-polar svg')].map(svg => svg.clientWidth)")
-    shown.set_viewport_size(usual)
+    usual = live_page.viewport_size
+    live_page.set_viewport_size({"width": width, "height": 900})
+    widths = live_page.evaluate("[...document.querySelectorAll('.live-polar svg')].map(svg => svg.clientWidth)")
+    live_page.set_viewport_size(usual)
     assert len(widths) > 2
     assert max(widths) - min(widths) <= 1
 
 
-def test_a_broken_limit_is_said(shown):
-    shown.evaluate("laufruheLive.page.then(page => page.setDesign({'web.mass': 2}))")
-    row = shown.locator('tr[data-measure="counterweight mass"]')
+def test_a_broken_limit_is_said(live_page):
+    live_page.evaluate("laufruheLive.page.then(page => page.setDesign({'web.mass': 2}))")
+    row = live_page.locator('tr[data-measure="counterweight mass"]')
     row.locator("text=broken").wait_for()
-    shown.wait_for_function("document.querySelector('[aria-live]').innerText.includes('counterweight mass')")
-    assert re.search("Breaks .*(counterweight mass|and [1-9] more)", shown.locator("[data-role=regret]").inner_text())
+    live_page.wait_for_function("document.querySelector('[aria-live]').innerText.includes('counterweight mass')")
+    assert re.search(
+        "Breaks .*(counterweight mass|and [1-9] more)", live_page.locator("[data-role=regret]").inner_text()
+    )
 
 
 @pytest.mark.parametrize(("mass", "met"), [(1.0 + 9e-6, "true"), (1.0 + 2e-5, "false")])
-def test_a_limit_is_broken_beyond_the_tolerance_of_solvers(shown, mass, met):
-    shown.evaluate(f"laufruheLive.page.then(page => page.setDesign({{'web.mass': {mass!r}}}))")
-    shown.locator(f'tr[data-measure="counterweight mass"][data-met={met}]').wait_for()
+def test_a_limit_is_broken_beyond_the_tolerance_of_solvers(live_page, mass, met):
+    live_page.evaluate(f"laufruheLive.page.then(page => page.setDesign({{'web.mass': {mass!r}}}))")
+    live_page.locator(f'tr[data-measure="counterweight mass"][data-met={met}]').wait_for()
 
 
 def test_limits_that_do_not_follow_stand_as_in_the_design_of_the_report(page: Page, tmp_path):
@@ -92,11 +94,11 @@ def test_a_norm_that_the_page_does_not_know_leaves_the_rest_at_work(still: Page,
     still.goto(page_of(problem, tmp_path).as_uri())
     still.locator("[data-decision]").first.wait_for()
     for values in designs(model, 3):
-        shown = {each["name"]: each["value"] for each in still.evaluate(MEASURES, values)}
+        live_page = {each["name"]: each["value"] for each in still.evaluate(MEASURES, values)}
         result = evaluated(problem, model, values)
-        assert shown["objective"] is None
+        assert live_page["objective"] is None
         for limit in problem.limits[1:]:
-            assert shown[limit.name] == pytest.approx(result.check_limit(limit).value, rel=1e-11, abs=1e-12)
+            assert live_page[limit.name] == pytest.approx(result.check_limit(limit).value, rel=1e-11, abs=1e-12)
     expect(still.locator("[data-role=regret]")).to_contain_text("The objective cannot be followed live.")
     row = still.locator('tr[data-measure="worst twentieth mount force"]')
     expect(row).to_contain_text("cannot be followed live")
@@ -107,47 +109,47 @@ def test_a_norm_that_the_page_does_not_know_leaves_the_rest_at_work(still: Page,
 @pytest.mark.parametrize(
     ("typed", "taken"), [("1,5", 1.5), ("0,125", 0.125), (" 1.25 ", 1.25), ("1e0", 1.0), ("9", 2.0)]
 )
-def test_a_typed_comma_is_a_decimal_sign(shown, typed, taken):
-    field = shown.locator('[data-number="web.mass"]')
+def test_a_typed_comma_is_a_decimal_sign(live_page, typed, taken):
+    field = live_page.locator('[data-number="web.mass"]')
     field.fill(typed)
     field.press("Enter")
-    assert shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == pytest.approx(taken)
+    assert live_page.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == pytest.approx(taken)
     expect(field).not_to_have_attribute("aria-invalid", "true")
 
 
-def test_a_redraw_keeps_the_text_of_a_field_that_is_being_typed_in(shown):
-    field = shown.locator('[data-number="web.mass"]')
+def test_a_redraw_keeps_the_text_of_a_field_that_is_being_typed_in(live_page):
+    field = live_page.locator('[data-number="web.mass"]')
     field.fill("1.25")
-    shown.evaluate("laufruheLive.page.then(page => (page.setDesign({'web.mass': 0.5}), page.drawNow()))")
+    live_page.evaluate("laufruheLive.page.then(page => (page.setDesign({'web.mass': 0.5}), page.drawNow()))")
     assert field.input_value() == "1.25"
     field.press("Enter")
-    assert shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == pytest.approx(1.25)
+    assert live_page.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == pytest.approx(1.25)
 
 
-def test_a_field_left_as_it_was_shows_the_design(shown):
-    field = shown.locator('[data-number="web.mass"]')
+def test_a_field_left_as_it_was_shows_the_design(live_page):
+    field = live_page.locator('[data-number="web.mass"]')
     before = field.input_value()
     field.fill("1.25")
     field.fill(before)
-    shown.evaluate("laufruheLive.page.then(page => (page.setDesign({'web.mass': 0.5}), page.drawNow()))")
+    live_page.evaluate("laufruheLive.page.then(page => (page.setDesign({'web.mass': 0.5}), page.drawNow()))")
     field.blur()
     assert float(field.input_value()) == 0.5
 
 
 @pytest.mark.parametrize("typed", ["1,500", "1,2,3", "one", "", "1.2.3", "NaN", "0x10", "Infinity"])
-def test_a_typed_text_that_is_no_number_is_refused_in_one_line(shown, typed):
-    before = shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])")
-    field = shown.locator('[data-number="web.mass"]')
+def test_a_typed_text_that_is_no_number_is_refused_in_one_line(live_page, typed):
+    before = live_page.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])")
+    field = live_page.locator('[data-number="web.mass"]')
     field.fill("1.1")
     field.fill(typed)
     field.press("Enter")
-    expect(shown.locator(".live-controls > .live-note")).to_contain_text(f'web.mass: "{typed}"')
+    expect(live_page.locator(".live-controls > .live-note")).to_contain_text(f'web.mass: "{typed}"')
     expect(field).to_have_attribute("aria-invalid", "true")
-    assert shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == before
+    assert live_page.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == before
 
 
-def test_another_model_keeps_the_sliders_that_it_still_has(shown):
-    numbers = shown.evaluate("""async () => {
+def test_another_model_keeps_the_sliders_that_it_still_has(live_page):
+    numbers = live_page.evaluate("""async () => {
         const page = await laufruheLive.page, model = JSON.parse(document.getElementById("live-model").textContent);
         page.setDesign({"web.mass": 0.5, "left.unbalance": 0.01});
         await page.setModel(model);
@@ -157,21 +159,25 @@ def test_another_model_keeps_the_sliders_that_it_still_has(shown):
     assert numbers["left.unbalance"] == 0.01
 
 
-def test_figures_follow_every_load(shown):
-    for choice in shown.locator('[name="Load shown"]').all():
+def test_figures_follow_every_load(live_page):
+    for choice in live_page.locator('[name="Load shown"]').all():
         choice.check(force=True)
-        labels = shown.locator(".live-figure svg").evaluate_all("all => all.map(one => one.getAttribute('aria-label'))")
+        labels = live_page.locator(".live-figure svg").evaluate_all(
+            "all => all.map(one => one.getAttribute('aria-label'))"
+        )
         assert all(len(label) > 20 for label in labels)
 
 
-def test_axe_finds_nothing_serious(shown):
-    assert serious(shown) == []
+def test_axe_finds_nothing_serious(live_page):
+    assert serious(live_page) == []
 
 
 NUMBERS = [0.0, 1.0, 999.96, 1234.5678, 0.00012345, 9.99e-5, 12345678.9, -3.14159, 1e6, 9999999.0, 0.5]
 
 
-def test_numbers_are_written_as_in_the_report(shown):
+def test_numbers_are_written_as_in_the_report(live_page):
     script = "laufruheLive.number"
-    assert shown.evaluate(f"all => all.map(value => {script}(value))", NUMBERS) == [number(each) for each in NUMBERS]
+    assert live_page.evaluate(f"all => all.map(value => {script}(value))", NUMBERS) == [
+        number(each) for each in NUMBERS
+    ]
     assert math.isclose(float(number(0.5)), 0.5)

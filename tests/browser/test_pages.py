@@ -38,48 +38,48 @@ def loaded(request: pytest.FixtureRequest, opened: Watched) -> str:
 
 
 @pytest.fixture
-def shown(loaded: str, still: Page) -> Page:
+def report_page(loaded: str, still: Page) -> Page:
     if still.url != loaded:
         still.goto(loaded)
     return still
 
 
-def test_reports_have_no_serious_finding(shown: Page) -> None:
+def test_reports_have_no_serious_finding(report_page: Page) -> None:
     for scheme in ("light", "dark"):
-        shown.emulate_media(color_scheme=scheme)
-        assert serious(shown) == [], scheme
+        report_page.emulate_media(color_scheme=scheme)
+        assert serious(report_page) == [], scheme
 
 
-def test_reports_fit_on_paper(shown: Page) -> None:
-    shown.set_viewport_size({"width": UPRIGHT, "height": 1000})
-    shown.emulate_media(media="print")
-    assert shown.evaluate(BEYOND) == []
+def test_reports_fit_on_paper(report_page: Page) -> None:
+    report_page.set_viewport_size({"width": UPRIGHT, "height": 1000})
+    report_page.emulate_media(media="print")
+    assert report_page.evaluate(BEYOND) == []
 
 
-def test_paper_is_white_and_its_letters_dark(shown: Page) -> None:
+def test_paper_is_white_and_its_letters_dark(report_page: Page) -> None:
     """Check the printed page on a dark screen too."""
-    shown.emulate_media(media="print", color_scheme="dark")
-    seen = shown.evaluate(COLOURS, "h1, h2, p, a, th, td, figcaption")
+    report_page.emulate_media(media="print", color_scheme="dark")
+    seen = report_page.evaluate(COLOURS, "h1, h2, p, a, th, td, figcaption")
     assert seen
     for ink, paper in seen:
         assert paper == 1.0
         assert (paper + 0.05) / (ink + 0.05) >= 7.0
     # grounds of their own that are printed are light too
-    assert serious(shown) == []
-    assert shown.evaluate("() => [...document.images].map(image => getComputedStyle(image).filter)") == ["none"] * len(
-        shown.locator("img").all()
-    )
+    assert serious(report_page) == []
+    assert report_page.evaluate("() => [...document.images].map(image => getComputedStyle(image).filter)") == [
+        "none"
+    ] * len(report_page.locator("img").all())
 
 
-def test_the_dark_page_is_dark(shown: Page) -> None:
-    shown.emulate_media(color_scheme="dark")
-    for ink, ground in shown.evaluate(COLOURS, "h1, p, a"):
+def test_the_dark_page_is_dark(report_page: Page) -> None:
+    report_page.emulate_media(color_scheme="dark")
+    for ink, ground in report_page.evaluate(COLOURS, "h1, p, a"):
         assert (ink + 0.05) / (ground + 0.05) >= 4.5
 
 
-def test_a_phone_moves_nothing_but_tables_and_pictures(shown: Page) -> None:
-    shown.set_viewport_size({"width": 390, "height": 800})
-    assert shown.evaluate("document.documentElement.scrollWidth") <= 390
+def test_a_phone_moves_nothing_but_tables_and_pictures(report_page: Page) -> None:
+    report_page.set_viewport_size({"width": 390, "height": 800})
+    assert report_page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_wide_tables_lie_on_paper_of_their_own(page: Page, tmp_path: Path) -> None:
@@ -99,14 +99,14 @@ def test_the_documentation_has_no_serious_finding(name: str, page: Page) -> None
         assert serious(page) == [], scheme
 
 
-def test_only_what_is_wider_than_the_screen_says_so(shown: Page) -> None:
+def test_only_what_is_wider_than_the_screen_says_so(report_page: Page) -> None:
     """Check that on a phone each wide picture and table, and nothing else, says that it scrolls."""
-    shown.emulate_media(media="screen")
-    shown.set_viewport_size({"width": 390, "height": 800})
+    report_page.emulate_media(media="screen")
+    report_page.set_viewport_size({"width": 390, "height": 800})
     # a timeline of scrolling is measured with the next frame
-    shown.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    report_page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
     words = "part => parseFloat(getComputedStyle(part, '::before').fontSize) > 0"
     moved = "part => part.scrollWidth > part.clientWidth"
-    said, wide = (shown.evaluate(f"[...document.querySelectorAll('.scroll')].map({f})") for f in (words, moved))
+    said, wide = (report_page.evaluate(f"[...document.querySelectorAll('.scroll')].map({f})") for f in (words, moved))
     assert said == wide
     assert any(wide)

@@ -108,7 +108,7 @@ def tried(seed: int, verb: str, folder: Path) -> Found:
     kind, content = damaged(seed)
     path = folder / ("trace.csv" if kind == "trace" else "damaged.toml")
     path.write_bytes(content)
-    before = _beside(folder)
+    before = _other_files(folder)
     problem = folder / "traced.toml" if kind == "trace" else path
     words = [verb, str(problem)] + (["--out", str(folder / "out"), "--no-plots"] if verb == "evaluate" else [])
     started, status, wrong, detail = time.process_time(), -1, "", ""
@@ -126,13 +126,13 @@ def tried(seed: int, verb: str, folder: Path) -> Found:
         wrong, detail = "hang", "".join(traceback.format_exception(error))[-1500:]
     seconds = time.process_time() - started
     shutil.rmtree(folder / "out", ignore_errors=True)
-    if not wrong and (_beside(folder) != before or path.read_bytes() != content):
-        wrong, detail = "touched", str(sorted(set(_beside(folder)) ^ set(before))[:5])
+    if not wrong and (_other_files(folder) != before or path.read_bytes() != content):
+        wrong, detail = "touched", str(sorted(set(_other_files(folder)) ^ set(before))[:5])
     path.unlink(missing_ok=True)
     return Found(seed, kind, verb, status, round(seconds, 3), wrong, detail)
 
 
-def _beside(folder: Path) -> list[tuple[str, int, int]]:
+def _other_files(folder: Path) -> list[tuple[str, int, int]]:
     found = [(entry.name, entry.stat()) for entry in os.scandir(folder) if entry.name != "out"]
     return sorted((name, about.st_size, about.st_mtime_ns) for name, about in found)
 

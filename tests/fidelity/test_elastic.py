@@ -27,7 +27,7 @@ from laufruhe.solvers import solve
 from problem_files import ELASTIC, PROBLEMS, written
 
 
-def held(path: Path) -> Problem:
+def on_given_mounts(path: Path) -> Problem:
     """Return a ready problem on its given mounts, with a load to judge."""
     problem = load(path).balance
     objective = problem.objective or load(PROBLEMS / "tractor-four-elastic.toml").balance.objective
@@ -37,7 +37,7 @@ def held(path: Path) -> Problem:
 @pytest.mark.parametrize("path", ELASTIC, ids=lambda path: path.stem)
 def test_modes_without_excitation_have_no_response(path: Path) -> None:
     """Compare motion with the whole matrices in the coordinates of the block."""
-    problem = held(path)
+    problem = on_given_mounts(path)
     engine, point = problem.engine, problem.points[0]
     assert engine.block is not None
     mounting, wrench = mounting_in(engine), evaluate(problem).loads[0].wrench
@@ -69,7 +69,7 @@ def stiffer(engine: Engine, factor: float) -> Engine:
 
 
 def test_stiff_mounts_are_rigid_ones() -> None:
-    problem = replace(held(PROBLEMS / "tractor-four-elastic.toml"), decisions=())
+    problem = replace(on_given_mounts(PROBLEMS / "tractor-four-elastic.toml"), decisions=())
     errors = []
     for factor in (1e5, 1e6):
         stiff = replace(problem, engine=stiffer(problem.engine, factor))
@@ -82,7 +82,7 @@ def test_stiff_mounts_are_rigid_ones() -> None:
 
 
 def test_every_mode_is_all_modes() -> None:
-    problem = held(PROBLEMS / "powertrain-least-force.toml")
+    problem = on_given_mounts(PROBLEMS / "powertrain-least-force.toml")
     values = [
         objective_value(own, evaluate(own))
         for modes in (None, (1, 2, 3, 4, 5, 6))
@@ -92,7 +92,7 @@ def test_every_mode_is_all_modes() -> None:
 
 
 def test_time_agrees_with_the_frequency_domain_of_the_same_law() -> None:
-    problem = held(PROBLEMS / "powertrain-least-force.toml")
+    problem = on_given_mounts(PROBLEMS / "powertrain-least-force.toml")
     fidelity = Fidelity(samples=180, orders=6)
     point = problem.points[0]
     wrench = evaluate(replace(problem, fidelity=fidelity)).loads[0].wrench
@@ -106,7 +106,7 @@ def test_time_agrees_with_the_frequency_domain_of_the_same_law() -> None:
 
 
 def test_without_hysteresis_the_two_laws_are_one() -> None:
-    problem = held(PROBLEMS / "powertrain-least-force.toml")
+    problem = on_given_mounts(PROBLEMS / "powertrain-least-force.toml")
     mounts = tuple(replace(m, loss_factor=0.0, damping=(300.0, 300.0, 300.0)) for m in problem.engine.mounts)
     engine = replace(problem.engine, mounts=mounts)
     wrench = evaluate(replace(problem, engine=engine)).loads[0].wrench
@@ -116,7 +116,7 @@ def test_without_hysteresis_the_two_laws_are_one() -> None:
 
 
 def test_travel_by_every_choice() -> None:
-    problem = held(PROBLEMS / "powertrain-least-force.toml")
+    problem = on_given_mounts(PROBLEMS / "powertrain-least-force.toml")
     one = replace(problem, points=problem.points[:1])
     sizes = {}
     for mounts in ("frequency", "rigid", "time"):
@@ -130,7 +130,7 @@ def test_travel_by_every_choice() -> None:
 
 
 def test_time_is_not_solved_for() -> None:
-    problem = held(PROBLEMS / "tractor-four-elastic.toml")
+    problem = on_given_mounts(PROBLEMS / "tractor-four-elastic.toml")
     with pytest.raises(ModelError, match=r"leave fidelity\.mounts out"):
         solve(replace(problem, fidelity=Fidelity(samples=48, mounts="time")))
 

@@ -299,7 +299,7 @@ def place_of(problem: Problem, result: Result) -> np.ndarray | None:
 def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
     """Return the claims of a solve that are wrong; none if all hold."""
     result = solve(problem)
-    initial = _given(problem)
+    initial = _initial_evaluation(problem)
     out = []
     met = initial is not None and initial.violation(problem.limits) <= 0.0
     if met and result.status in (Status.INFEASIBLE, Status.FAILED):
@@ -333,7 +333,7 @@ def drawn_problem(family: str, seed: int, folder: Path) -> Problem:
     return load_text(drawn, limits_of(drawn, load_text(drawn, [])))
 
 
-def _given(problem: Problem) -> Evaluation | None:
+def _initial_evaluation(problem: Problem) -> Evaluation | None:
     try:
         return evaluate(problem)
     except Exception:

@@ -30,7 +30,7 @@ SHORT = '[objective]\nminimise = "decoupling shortfall"\nmotions = ["bounce", "r
 ANY = (0.0, math.inf)
 
 
-def _given(mounting):
+def _plain_matrices(mounting):
     """Return K, M and the unit rotation about I^-1 e from their definitions."""
     block = mounting.block
     axis = np.linalg.solve(np.array(block.inertia) - block.turning_inertia * np.diag([1.0, 0.0, 0.0]), [1.0, 0.0, 0.0])
@@ -41,7 +41,7 @@ def _given(mounting):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_the_best_square_of_given_stiffness_is_that_of_a_search(seed, band):
     mounting = random_mounting(seed)
-    k, m, q = _given(mounting)
+    k, m, q = _plain_matrices(mounting)
     low, high = ((math.tau * f) ** 2 for f in (band[0], min(band[1], 200.0)))
     minimum = minimize_scalar(lambda s: np.linalg.norm(k @ q - s * (m @ q)), bounds=(low, high), method="bounded").fun
     minimum = min(minimum, *(float(np.linalg.norm(k @ q - s * (m @ q))) for s in (low, high)))
@@ -55,7 +55,7 @@ def test_a_block_that_turns_about_its_axis_in_a_mode_leaves_nothing():
     places = [(x, y, z) for x in (-0.3, 0.3) for y in (-0.2, 0.2) for z in (-0.1, 0.1)]
     mounts = tuple(replace(mounting.mounts[0], name=str(k), position=p) for k, p in enumerate(places))
     even = replace(mounting, block=block, mounts=mounts)
-    k, m, q = _given(even)
+    k, m, q = _plain_matrices(even)
     square = float(q @ k @ q) / float(q @ m @ q)
     assert residual_of(even, raw_residual(block, ANY)) < 1e-9 * np.linalg.norm(k @ q)
     assert torque_roll_frequency(even) == pytest.approx(math.sqrt(square) / math.tau, rel=1e-12)
@@ -67,12 +67,12 @@ def _joint_least_squares(problem, low, high):
     decisions = problem.decisions
 
     def rows(x):
-        k, _, q = _given(mounting_in(problem.design(list(x))))
+        k, _, q = _plain_matrices(mounting_in(problem.design(list(x))))
         return k @ q
 
     unit, zero = 1e5, rows([0.0] * len(decisions))
     slopes = np.array([(rows([unit * (j == k) for k in range(len(decisions))]) - zero) for j in range(len(decisions))])
-    _, m, q = _given(mounting_in(problem.engine))
+    _, m, q = _plain_matrices(mounting_in(problem.engine))
     columns = np.column_stack([slopes.T, -1e4 * (m @ q)])
     lower = [*(d.lower / unit for d in decisions), low / 1e4]
     upper = [*(d.upper / unit for d in decisions), high / 1e4]
@@ -157,7 +157,7 @@ def test_a_projection_is_no_longer_than_components_allow():
 
 def _share(problem, x):
     """Return the shares of motions from SciPy's generalised eigenproblem."""
-    k, m, _ = _given(mounting_in(problem.design(list(x))))
+    k, m, _ = _plain_matrices(mounting_in(problem.design(list(x))))
     shapes = eigh(k, m)[1]
     return shapes * (m @ shapes)
 

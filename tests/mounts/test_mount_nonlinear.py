@@ -361,11 +361,11 @@ def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
 
 
 def test_an_active_limit_on_a_load_has_a_price(tmp_path):
-    def found(maximum: float):
+    def solved_under(maximum: float):
         limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{maximum} N"\n'
         return solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limits, SEARCH))
 
-    loose, wide = found(3.0), found(1e6)
+    loose, wide = solved_under(3.0), solved_under(1e6)
     assert loose.limits[0].active
     assert loose.limits[0].value == pytest.approx(3.0, rel=1e-5)
     assert loose.limits[0].shadow_price > 0.0

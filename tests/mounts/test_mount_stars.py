@@ -165,15 +165,15 @@ def test_throws_that_fire_unevenly_get_the_firing_order_that_gas_likes_best(tmp_
                      ('"open"', "[0, 100, 190, 300]"), ("cylinders = 4\n", ""))  # fmt: skip
     engine = engine.partition("[[counterweights]]")[0]
 
-    def found(order, search=UNBOUNDED):
+    def solved_in_order(order, search=UNBOUNDED):
         text = changed(engine, ('firing_order = "open"', f"firing_order = {order}"))
         force = '[objective]\nminimise = "rms mount force"\norders = [0.5, 1.5]\n'
         return solve(problem_of(tmp_path, text, BLOCK, MOUNTS, gas, force, search, wide))
 
-    best = found('"open"', SEARCH)
+    best = solved_in_order('"open"', SEARCH)
     values = {}
     for order in ([1, 4, 2, 3], [1, 3, 2, 4], [1, 3, 4, 2], [1, 2, 4, 3], [1, 4, 3, 2]):
-        values[tuple(order)] = found(order).objective.value
+        values[tuple(order)] = solved_in_order(order).objective.value
     assert max(values.values()) > 1.02 * min(values.values())
     assert best.objective.value == pytest.approx(min(values.values()), rel=1e-4)
     assert best.certificate.lower_bound <= min(values.values())

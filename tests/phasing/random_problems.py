@@ -35,7 +35,7 @@ class Writer:
         parts = [f'title = "seed {self.seed}"\n[engine]\n{engine}', self._phasing()]
         if gas:
             parts.append(f'[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "{self.number(4, 9)} bar"')
-        parts += [self._points(), self._mounting(), self._rotors(), self._asked()]
+        parts += [self._points(), self._mounting(), self._rotors(), self._objective()]
         return "\n".join(parts) + "\n"
 
     def _engine(self) -> str:

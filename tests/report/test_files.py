@@ -67,7 +67,7 @@ def add_meanwhile(folder: Path, name: str) -> None:
         (folder / name).write_text("mine")
 
 
-def held(folder: Path) -> tuple[set[str], set[str]]:
+def names_and_contents(folder: Path) -> tuple[set[str], set[str]]:
     """Return the names and contents of a set."""
     found = {path.name: path.read_text() for path in folder.glob("file-*")}
     return set(found), set(found.values())
@@ -112,11 +112,11 @@ def test_a_kill_at_any_moment(makers: int, swaps: bool, tmp_path: Path) -> None:
         for one in running:
             one.stdout.close()
         if swaps:
-            names, texts = held(folder)
+            names, texts = names_and_contents(folder)
             assert len(texts) == 1
             assert names == set(NAMES[: 4 + int(texts.pop()) % 5])
     make(folder, "done")
-    assert held(folder) == (set(NAMES), {"done"})
+    assert names_and_contents(folder) == (set(NAMES), {"done"})
     assert (folder / "notes.txt").read_text() == "mine"
     assert {path.name for path in tmp_path.iterdir()} == {"set"}
 
@@ -133,9 +133,9 @@ def test_a_kill_after_each_step(swaps: bool, renamed: int, tmp_path: Path) -> No
     ended = subprocess.run(words, stdout=subprocess.DEVNULL, check=False)
     assert ended.returncode == (0 if swaps else -signal.SIGKILL)
     if swaps:
-        assert held(folder) == (set(NAMES), {"9"})
+        assert names_and_contents(folder) == (set(NAMES), {"9"})
     make(folder, "done")
-    assert held(folder) == (set(NAMES), {"done"})
+    assert names_and_contents(folder) == (set(NAMES), {"done"})
     assert {path.name for path in tmp_path.iterdir()} == {"set"}
 
 
@@ -158,7 +158,7 @@ def test_an_error_leaves_all_as_it_was(tmp_path: Path) -> None:
     make(tmp_path / "set", "old")
     with pytest.raises(ZeroDivisionError):
         fail(tmp_path / "set")
-    assert held(tmp_path / "set") == (set(NAMES), {"old"})
+    assert names_and_contents(tmp_path / "set") == (set(NAMES), {"old"})
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_a_damaged_note_owns_no_files(noted: str, tmp_path: Path) -> None:
     (tmp_path / "set" / MADE).write_text(noted)
     with pytest.raises(InputError, match="did not make"):
         make(tmp_path / "set", "new")
-    assert held(tmp_path / "set") == (set(NAMES), {"old"})
+    assert names_and_contents(tmp_path / "set") == (set(NAMES), {"old"})
 
 
 @pytest.mark.parametrize("named", ['["gone"]', '["../other"]', "[1, null, [2]]", '["a\\u0000b", "/etc/hostname", "."]'])
@@ -203,8 +203,8 @@ def test_a_run_that_works_is_not_swept_away(locks: bool, tmp_path: Path, monkeyp
         (first / NAMES[0]).write_text("first")
         make(tmp_path / "set", "second")
         assert (first / NAMES[0]).exists()
-        assert held(tmp_path / "set") == (set(NAMES), {"second"})
-    assert held(tmp_path / "set") == ({NAMES[0]}, {"first"})
+        assert names_and_contents(tmp_path / "set") == (set(NAMES), {"second"})
+    assert names_and_contents(tmp_path / "set") == ({NAMES[0]}, {"first"})
 
 
 def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
@@ -212,7 +212,7 @@ def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to("real")
     make(tmp_path / "link", "new")
     assert (tmp_path / "link").is_symlink()
-    assert held(tmp_path / "real") == (set(NAMES), {"new"})
+    assert names_and_contents(tmp_path / "real") == (set(NAMES), {"new"})
 
 
 def test_one_file_appears_whole(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from ready import solved
 from report.test_json_result import RESULTS
 
 
-def saved(result: Result, folder: Path, series: bool = False) -> laufruhe.SavedResult:
+def saved_result(result: Result, folder: Path, series: bool = False) -> laufruhe.SavedResult:
     place = folder / "result.json"
     laufruhe.write_result(result, place, series)
     assert place.read_text(encoding="utf-8") == as_json(result, series)
@@ -33,7 +33,7 @@ def fields(thing: object) -> str:
 
 def is_read_back(result: Result, folder: Path) -> None:
     """Check that all fields of both are equal to the last bit."""
-    actual = saved(result, folder, series=True)
+    actual = saved_result(result, folder, series=True)
     assert (actual.name, actual.title) == (result.problem.name, result.problem.title)
     assert (actual.status, actual.message, actual.conflict) == (result.status, result.message, result.conflict)
     assert fields(actual.certificate) == fields(result.certificate)
@@ -63,7 +63,7 @@ def test_a_ready_problem_is_read_back(name: str, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_decided_values_go_into_the_problem_again(tmp_path: Path) -> None:
     result = solved("tractor-single")
-    again = result.problem.with_values(saved(result, tmp_path).values)
+    again = result.problem.with_values(saved_result(result, tmp_path).values)
     assert result.objective is not None
     assert laufruhe.evaluate(again).objective.value == pytest.approx(result.objective.value, rel=1e-5)  # type: ignore[union-attr]
     assert [d.start for d in again.decisions] == [d.value for d in result.decisions]
@@ -71,7 +71,7 @@ def test_decided_values_go_into_the_problem_again(tmp_path: Path) -> None:
 
 def test_a_folder_of_results_is_enough(tmp_path: Path) -> None:
     result = scenes.solved(scenes.TIGHT)
-    assert repr(saved(result, tmp_path)) == repr(laufruhe.read_result(str(tmp_path)))
+    assert repr(saved_result(result, tmp_path)) == repr(laufruhe.read_result(str(tmp_path)))
 
 
 def _without(key: str) -> Callable[[dict[str, Any]], Any]:
@@ -117,8 +117,8 @@ def test_a_missing_result_is_refused(tmp_path: Path) -> None:
 
 
 def test_null_is_no_number(tmp_path: Path) -> None:
-    result = saved(scenes.solved(scenes.IMPOSSIBLE), tmp_path)
+    result = saved_result(scenes.solved(scenes.IMPOSSIBLE), tmp_path)
     assert result.objective is None
     assert result.certificate is None
-    prices = [limit.shadow_price for limit in saved(scenes.stated(scenes.GIVEN), tmp_path).limits]
+    prices = [limit.shadow_price for limit in saved_result(scenes.stated(scenes.GIVEN), tmp_path).limits]
     assert all(math.isnan(price) for price in prices)

@@ -85,7 +85,7 @@ weight = 2
 
 
 @pytest.fixture
-def closed(tmp_path: Path) -> Problem:
+def closed_problem(tmp_path: Path) -> Problem:
     """Return the elastic mounts without anything open, and a transmissibility to be least."""
     mounts = changed(MOUNTS, (OPEN, '"400 N/mm"'), (OPEN, '"400 N/mm"'))
     objective = '[objective]\nminimise = "transmissibility"\noperating_points = ["idle"]\norders = [1]\n'
@@ -93,21 +93,21 @@ def closed(tmp_path: Path) -> Problem:
     return problem_of(tmp_path, yoke, BLOCK, mounts, objective)
 
 
-def test_closed_problems_on_elastic_mounts_are_evaluated(closed: Problem) -> None:
+def test_closed_problems_on_elastic_mounts_are_evaluated(closed_problem: Problem) -> None:
     """The first order of a Scotch yoke is a force through the middle: one mass on one spring (eq. 40)."""
-    result = solve(closed)
+    result = solve(closed_problem)
     assert result.status is Status.FEASIBLE
     assert result.certificate is None
     assert not result.decisions
     assert result.objective is not None
-    ratio = closed.points[0].speed ** 2 / (4.0 * 400e3 / 420.0)
+    ratio = closed_problem.points[0].speed ** 2 / (4.0 * 400e3 / 420.0)
     single = math.hypot(1.0, 0.1) / math.hypot(1.0 - ratio, 0.1)
     assert result.objective.value == pytest.approx(single, rel=1e-9)
     assert explained(result).startswith("Nothing was decided")
 
 
-def test_a_problem_shows_itself_in_a_line(closed: Problem) -> None:
-    assert repr(closed) == (
+def test_a_problem_shows_itself_in_a_line(closed_problem: Problem) -> None:
+    assert repr(closed_problem) == (
         "<Problem problem, 1 cylinder, four-stroke, 4 mounts, 1 operating point, 0 limits; open: nothing>"
     )
-    assert closed._repr_html_().startswith("<strong>test</strong>\n<div>problem, 1 cylinder")
+    assert closed_problem._repr_html_().startswith("<strong>test</strong>\n<div>problem, 1 cylinder")

@@ -25,29 +25,29 @@ RULES = {
 
 
 @pytest.fixture(scope="module")
-def found() -> dict[str, set[str]]:
+def rule_breaks() -> dict[str, set[str]]:
     cache = once("source-shape", lambda folder: (folder / "found").write_bytes(pickle.dumps(source_shape.measured())))
     return pickle.loads((cache / "found").read_bytes())
 
 
 @pytest.mark.parametrize("rule", RULES)
-def test_nothing_new_breaks_a_rule_of_the_structure(rule, found):
+def test_nothing_new_breaks_a_rule_of_the_structure(rule, rule_breaks):
     allowed = source_shape.exceptions()[rule]
-    new = {name for name in found[rule] if not source_shape.still_allowed(name, allowed)}
+    new = {name for name in rule_breaks[rule] if not source_shape.still_allowed(name, allowed)}
     assert not new, f"{RULES[rule]}: {sorted(new)} ({source_shape.total_lines()} lines of source in all)"
 
 
 @pytest.mark.parametrize("rule", RULES)
-def test_an_exception_that_is_mended_is_taken_out(rule, found):
-    mended = source_shape.exceptions()[rule] - found[rule]
+def test_an_exception_that_is_mended_is_taken_out(rule, rule_breaks):
+    mended = source_shape.exceptions()[rule] - rule_breaks[rule]
     assert not mended, (
         f"no longer {RULES[rule]}: {sorted(mended)}; run `python tests/structure/source_shape.py --prune` "
         f"({source_shape.total_lines()} lines of source in all)"
     )
 
 
-def test_the_rules_are_those_that_are_measured(found):
-    assert set(RULES) == set(found) == set(source_shape.exceptions())
+def test_the_rules_are_those_that_are_measured(rule_breaks):
+    assert set(RULES) == set(rule_breaks) == set(source_shape.exceptions())
 
 
 def test_every_room_has_its_tests():

@@ -136,13 +136,13 @@ class TestAgainstClosedForms:
         assert result.certificate.kind is Proof.GLOBAL
         places = [d for d in problem.decisions if d.place_drives]
         level = problem.design([0.0] * len(places), places)
-        level_result = laufruhe.solve(_held(problem, level))
+        level_result = laufruhe.solve(_with_engine(problem, level))
         assert result.objective is not None
         assert level_result.objective is not None
         assert result.objective.value < 0.98 * level_result.objective.value
 
 
-def _held(problem: Problem, engine: Engine) -> Problem:
+def _with_engine(problem: Problem, engine: Engine) -> Problem:
     return replace(problem, engine=engine, decisions=problem.unbalances)
 
 

@@ -73,8 +73,8 @@ def finished() -> Callable[..., None]:
 def worth() -> Callable[..., Any]:
     """Return a function that evaluates an expression in a part of a replication, by default in the first reading."""
 
-    def found(name: str, text: str, file: str = "tractor-study", reading: str | None = None) -> Any:
+    def evaluate_text(name: str, text: str, file: str = "tractor-study", reading: str | None = None) -> Any:
         names = parts_of(file)[name].names(computed(file, name))
         return value_of(text, names[reading or next(iter(names))])
 
-    return found
+    return evaluate_text

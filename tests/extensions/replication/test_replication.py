@@ -108,7 +108,7 @@ class TestExpressions:
             numbers_of({"k": {"from": 0}}, {})
 
 
-def _judged(**more: Any) -> str:
+def _verdict(**more: Any) -> str:
     statement = StatementTable.model_validate({"text": "s", "printed": "1", "value": "x", **more})
     return str(judge_statements([statement], {"": NAMES})["verdict"][1][0][0])
 
@@ -123,7 +123,7 @@ def _judged(**more: Any) -> str:
     ({"holds": "value > 2", "printed": None}, "not in the study"),
 ])  # fmt: skip
 def test_verdicts(more: dict[str, Any], verdict: str) -> None:
-    assert _judged(**more) == verdict
+    assert _verdict(**more) == verdict
 
 
 def test_table_and_count() -> None:
@@ -293,7 +293,7 @@ def test_a_panel_that_cannot_be_drawn_is_named(panel: dict[str, Any], said: str)
                                   {"is": "y['a']", "within": 0}, {"holds": "x", "why": "{y:.1f}"}])  # fmt: skip
 def test_statements_are_judged_by_single_numbers(more: dict[str, Any]) -> None:
     with pytest.raises(ExpressionError, match="is no single number; take one of its numbers"):
-        _judged(**more)
+        _verdict(**more)
 
 
 @pytest.mark.parametrize(("key", "value"), [
@@ -311,7 +311,7 @@ def test_every_colour_is_one_of_the_pictures() -> None:
 @pytest.mark.parametrize("within", ["5", "five %", "-5 %", "%"])
 def test_a_tolerance_is_a_number_or_a_share(within: str) -> None:
     with pytest.raises(ValueError, match="within"):
-        _judged(**{"is": 1, "within": within})
+        _verdict(**{"is": 1, "within": within})
 
 
 @pytest.mark.parametrize("like", ["a", "b", ["a"], 3])

@@ -77,7 +77,7 @@ def address(file: Path) -> Iterator[str]:
 
 
 @pytest.fixture
-def shown(page: Page, address: str) -> Page:
+def problem_page(page: Page, address: str) -> Page:
     page.goto(address)
     settled(page)
     return page
@@ -118,64 +118,66 @@ def solved(path: Path, **values: str) -> float:
     return objective.value
 
 
-def test_the_optimum_follows_a_limit_and_is_proven_when_it_rests(shown: Page, file: Path) -> None:
-    free = settled(shown)
+def test_the_optimum_follows_a_limit_and_is_proven_when_it_rests(problem_page: Page, file: Path) -> None:
+    free = settled(problem_page)
     assert free == pytest.approx(solved(file), rel=1e-6)
     # the proven answer soon replaces the estimate, so the page itself notes the estimate
-    shown.evaluate(CLAIMS)
-    slide(shown, MASS, 0.5)
-    tight = settled(shown)
-    estimates = [float(claim["value"]) for claim in shown.evaluate("window.claimsSeen") if claim["kind"] == "estimate"]
+    problem_page.evaluate(CLAIMS)
+    slide(problem_page, MASS, 0.5)
+    tight = settled(problem_page)
+    estimates = [
+        float(claim["value"]) for claim in problem_page.evaluate("window.claimsSeen") if claim["kind"] == "estimate"
+    ]
     assert estimates[-1] == pytest.approx(tight, rel=2e-3)
     assert tight == pytest.approx(solved(file, constraints__1__max="0.5 kg"), rel=1e-6)
     assert tight > 1.5 * free
-    expect(shown.locator("#claim")).to_contain_text("proven: no design has less than")
+    expect(problem_page.locator("#claim")).to_contain_text("proven: no design has less than")
     # weights have moved to that design, and the page's own sum of it is that value
-    shows(shown, tight, 1e-4)
-    expect(shown.locator(f'.control:has([data-control="{MASS}"]) .said')).to_contain_text("N per kg")
+    shows(problem_page, tight, 1e-4)
+    expect(problem_page.locator(f'.control:has([data-control="{MASS}"]) .said')).to_contain_text("N per kg")
 
 
-def test_limits_that_contradict_each_other_are_marked_and_stay_usable(shown: Page) -> None:
-    slide(shown, FORCE, 600.0)
-    slide(shown, MASS, 0.2)
-    expect(shown.locator('#claim[data-kind="no design"]')).to_contain_text(
+def test_limits_that_contradict_each_other_are_marked_and_stay_usable(problem_page: Page) -> None:
+    slide(problem_page, FORCE, 600.0)
+    slide(problem_page, MASS, 0.2)
+    expect(problem_page.locator('#claim[data-kind="no design"]')).to_contain_text(
         "'balancer mass' and 'maximum mount force' contradict each other"
     )
-    assert shown.locator(".control.conflict").count() == 2
-    expect(shown.locator(f'[data-control="{MASS}"]')).to_be_enabled()
-    slide(shown, MASS, 4.0)
-    assert settled(shown) > 0.0
-    assert shown.locator(".control.conflict").count() == 0
+    assert problem_page.locator(".control.conflict").count() == 2
+    expect(problem_page.locator(f'[data-control="{MASS}"]')).to_be_enabled()
+    slide(problem_page, MASS, 4.0)
+    assert settled(problem_page) > 0.0
+    assert problem_page.locator(".control.conflict").count() == 0
 
 
-def test_it_is_used_by_keys_alone(shown: Page) -> None:
-    before = settled(shown)
-    slider = shown.locator('[data-control="operating_points.1.speed"]')
+def test_it_is_used_by_keys_alone(problem_page: Page) -> None:
+    before = settled(problem_page)
+    slider = problem_page.locator('[data-control="operating_points.1.speed"]')
     for _ in range(60):
-        shown.keyboard.press("Tab")
+        problem_page.keyboard.press("Tab")
         if slider.evaluate("own => own === document.activeElement"):
             break
     expect(slider).to_be_focused()
     for _ in range(3):
-        shown.keyboard.press("PageUp")
-    assert settled(shown) > before
-    shown.keyboard.press("Tab")
-    shown.keyboard.press("Tab")
-    shown.keyboard.press("Enter")
-    expect(shown.locator(".control.changed")).to_have_count(0)
-    assert settled(shown) == pytest.approx(before, rel=1e-6)
+        problem_page.keyboard.press("PageUp")
+    assert settled(problem_page) > before
+    problem_page.keyboard.press("Tab")
+    problem_page.keyboard.press("Tab")
+    problem_page.keyboard.press("Enter")
+    expect(problem_page.locator(".control.changed")).to_have_count(0)
+    assert settled(problem_page) == pytest.approx(before, rel=1e-6)
 
 
-def test_the_state_is_in_the_address_and_the_token_is_not(shown: Page, address: str) -> None:
-    slide(shown, "engine.rod_ratio", 0.3)
-    tight = settled(shown)
-    assert address.partition("#t=")[2] not in shown.url
-    assert "rod_ratio" in shown.url
-    shown.reload()
-    assert settled(shown) == pytest.approx(tight, rel=1e-9)
-    shown.locator("#back").click()
-    assert settled(shown) != pytest.approx(tight, rel=1e-3)
-    assert "rod_ratio" not in shown.url
+def test_the_state_is_in_the_address_and_the_token_is_not(problem_page: Page, address: str) -> None:
+    slide(problem_page, "engine.rod_ratio", 0.3)
+    tight = settled(problem_page)
+    assert address.partition("#t=")[2] not in problem_page.url
+    assert "rod_ratio" in problem_page.url
+    problem_page.reload()
+    assert settled(problem_page) == pytest.approx(tight, rel=1e-9)
+    problem_page.locator("#back").click()
+    assert settled(problem_page) != pytest.approx(tight, rel=1e-3)
+    assert "rod_ratio" not in problem_page.url
 
 
 def test_a_visitor_without_the_token_gets_a_message(page: Page, address: str) -> None:
@@ -186,59 +188,59 @@ def test_a_visitor_without_the_token_gets_a_message(page: Page, address: str) ->
     other.close()
 
 
-def test_a_bad_number_is_a_line_and_nothing_is_lost(shown: Page) -> None:
-    figure = shown.locator('[data-number-of="engine.rod_ratio"]')
+def test_a_bad_number_is_a_line_and_nothing_is_lost(problem_page: Page) -> None:
+    figure = problem_page.locator('[data-number-of="engine.rod_ratio"]')
     figure.fill("1.4")
     figure.press("Enter")
-    expect(shown.locator("#complaint")).to_contain_text("engine.rod_ratio")
+    expect(problem_page.locator("#complaint")).to_contain_text("engine.rod_ratio")
     figure.fill("0.27")
     figure.press("Enter")
-    expect(shown.locator("#complaint")).to_be_hidden()
-    assert settled(shown) > 0.0
+    expect(problem_page.locator("#complaint")).to_be_hidden()
+    assert settled(problem_page) > 0.0
 
 
-def test_two_designs_stand_side_by_side(shown: Page) -> None:
-    first = settled(shown)
-    shown.locator("#keep").click()
-    slide(shown, MASS, 0.5)
-    second = settled(shown)
-    shows(shown, second, 1e-4)
-    row = shown.locator("#compared tr").nth(1).inner_text()
+def test_two_designs_stand_side_by_side(problem_page: Page) -> None:
+    first = settled(problem_page)
+    problem_page.locator("#keep").click()
+    slide(problem_page, MASS, 0.5)
+    second = settled(problem_page)
+    shows(problem_page, second, 1e-4)
+    row = problem_page.locator("#compared tr").nth(1).inner_text()
     a, b = re.findall(r"([\d.]+) N", row)
     assert (float(a), float(b)) == pytest.approx((first, second), rel=1e-3)
-    assert shown.locator("#kept svg").count() >= 3
-    shown.locator("#show-a").click()
-    assert settled(shown) == pytest.approx(first, rel=1e-6)
+    assert problem_page.locator("#kept svg").count() >= 3
+    problem_page.locator("#show-a").click()
+    assert settled(problem_page) == pytest.approx(first, rel=1e-6)
 
 
-def test_the_front_fills_in_and_a_point_is_a_design(shown: Page) -> None:
-    shown.locator("#across").select_option("balancer mass")
-    shown.locator("#draw").click()
-    expect(shown.locator("#front-state")).to_contain_text("done")
-    assert shown.locator("#front circle").count() >= 20
-    point = shown.locator("#front circle").nth(10)
+def test_the_front_fills_in_and_a_point_is_a_design(problem_page: Page) -> None:
+    problem_page.locator("#across").select_option("balancer mass")
+    problem_page.locator("#draw").click()
+    expect(problem_page.locator("#front-state")).to_contain_text("done")
+    assert problem_page.locator("#front circle").count() >= 20
+    point = problem_page.locator("#front circle").nth(10)
     label = point.get_attribute("aria-label") or ""
     point.focus()
-    shown.keyboard.press("Enter")
+    problem_page.keyboard.press("Enter")
     value = re.search(r": ([\d.]+) N;", label)
     assert value is not None
-    shows(shown, float(value[1]), 2e-3)
-    expect(shown.locator("#follows")).not_to_be_checked()
+    shows(problem_page, float(value[1]), 2e-3)
+    expect(problem_page.locator("#follows")).not_to_be_checked()
 
 
-def test_the_engine_turns(shown: Page) -> None:
-    before = shown.locator("#engine").inner_html()
-    shown.locator("#turn").click()
-    shown.wait_for_function("before => document.getElementById('engine').innerHTML !== before", arg=before)
-    shown.locator("#turn").click()
-    assert shown.locator("#engine .piston").count() >= 8
+def test_the_engine_turns(problem_page: Page) -> None:
+    before = problem_page.locator("#engine").inner_html()
+    problem_page.locator("#turn").click()
+    problem_page.wait_for_function("before => document.getElementById('engine').innerHTML !== before", arg=before)
+    problem_page.locator("#turn").click()
+    assert problem_page.locator("#engine .piston").count() >= 8
 
 
-def test_the_state_is_saved(shown: Page, tmp_path: Path) -> None:
-    slide(shown, MASS, 0.5)
-    tight = settled(shown)
-    with shown.expect_download() as download:
-        shown.locator("#save").click()
+def test_the_state_is_saved(problem_page: Page, tmp_path: Path) -> None:
+    slide(problem_page, MASS, 0.5)
+    tight = settled(problem_page)
+    with problem_page.expect_download() as download:
+        problem_page.locator("#save").click()
     path = tmp_path / download.value.suggested_filename
     download.value.save_as(path)
     result = laufruhe.evaluate(path).objective
@@ -246,9 +248,9 @@ def test_the_state_is_saved(shown: Page, tmp_path: Path) -> None:
     assert result.value == pytest.approx(tight, rel=1e-4)
 
 
-def test_the_page_has_no_serious_finding(shown: Page) -> None:
-    shown.locator("#keep").click()
-    assert serious(shown) == []
+def test_the_page_has_no_serious_finding(problem_page: Page) -> None:
+    problem_page.locator("#keep").click()
+    assert serious(problem_page) == []
 
 
 def test_it_watches_the_file_and_outlives_the_server(page: Page, tmp_path: Path) -> None:
@@ -301,30 +303,30 @@ def test_limits_of_a_run_up_are_measured_when_sliders_rest(page: Page) -> None:
     assert shown_value == pytest.approx(built.check_limit(problem.limits[0]).value, rel=1e-9)
 
 
-def test_on_a_phone_the_optimum_stays_in_sight_and_groups_are_folded(shown: Page) -> None:
-    shown.set_viewport_size({"width": 390, "height": 844})
-    shown.reload()
-    settled(shown)
-    assert shown.evaluate("document.documentElement.scrollWidth") <= 390
-    speed = shown.locator('[data-control="operating_points.1.speed"]')
+def test_on_a_phone_the_optimum_stays_in_sight_and_groups_are_folded(problem_page: Page) -> None:
+    problem_page.set_viewport_size({"width": 390, "height": 844})
+    problem_page.reload()
+    settled(problem_page)
+    assert problem_page.evaluate("document.documentElement.scrollWidth") <= 390
+    speed = problem_page.locator('[data-control="operating_points.1.speed"]')
     expect(speed).to_be_hidden()
-    shown.get_by_text("3 numbers").click()
+    problem_page.get_by_text("3 numbers").click()
     expect(speed).to_be_visible()
-    shown.evaluate("scrollTo(0, 1500)")
-    expect(shown.locator("#claim")).to_be_in_viewport()
-    assert serious(shown) == []
+    problem_page.evaluate("scrollTo(0, 1500)")
+    expect(problem_page.locator("#claim")).to_be_in_viewport()
+    assert serious(problem_page) == []
 
 
-def test_on_a_phone_pictures_keep_their_letters_and_are_moved(shown: Page) -> None:
-    shown.set_viewport_size({"width": 390, "height": 844})
-    shown.locator("#picture").click()
+def test_on_a_phone_pictures_keep_their_letters_and_are_moved(problem_page: Page) -> None:
+    problem_page.set_viewport_size({"width": 390, "height": 844})
+    problem_page.locator("#picture").click()
     # all of them, however many a result has
-    expect(shown.locator("#pictures-state")).to_contain_text(re.compile(r"^(\d+) of \1$"))
-    image = shown.locator("#drawn img").first
+    expect(problem_page.locator("#pictures-state")).to_contain_text(re.compile(r"^(\d+) of \1$"))
+    image = problem_page.locator("#drawn img").first
     image.scroll_into_view_if_needed()
     assert image.evaluate("(drawn) => drawn.clientWidth") > 600
-    assert shown.evaluate("document.documentElement.scrollWidth") <= 390
-    assert serious(shown) == []
+    assert problem_page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert serious(problem_page) == []
 
 
 def test_a_crank_is_clicked_and_given_back(page: Page) -> None:
@@ -344,28 +346,28 @@ def test_a_crank_is_clicked_and_given_back(page: Page) -> None:
 
 @pytest.mark.parametrize(("control", "values"), [(MASS, (3.0, 0.5)), ("operating_points.1.speed", (2600.0, 3000.0))])
 def test_claims_of_earlier_settings_are_marked_in_the_moment_a_slider_moves(
-    shown: Page, control: str, values: tuple[float, ...]
+    problem_page: Page, control: str, values: tuple[float, ...]
 ) -> None:
-    before = shown.locator("#claim").inner_text()
+    before = problem_page.locator("#claim").inner_text()
     assert before.startswith("Optimum ")
     for value in values:
-        seen = shown.evaluate(AT_ONCE, [control, value])
+        seen = problem_page.evaluate(AT_ONCE, [control, value])
         assert seen["isEarlier"]
         assert seen["text"].startswith("Earlier settings: ")
         assert seen["card"].startswith("Earlier settings; ")
-    settled(shown)
-    assert shown.locator("#claim").inner_text().startswith("Optimum ")
-    assert "proven optimum" in shown.locator("[data-role=regret]").inner_text()
+    settled(problem_page)
+    assert problem_page.locator("#claim").inner_text().startswith("Optimum ")
+    assert "proven optimum" in problem_page.locator("[data-role=regret]").inner_text()
 
 
-def test_no_claim_is_shown_for_settings_that_it_is_not_about(shown: Page) -> None:
+def test_no_claim_is_shown_for_settings_that_it_is_not_about(problem_page: Page) -> None:
     """Check claims while a slider moves faster than answers come."""
-    shown.evaluate(CLAIMS)
+    problem_page.evaluate(CLAIMS)
     for k in range(12):
-        slide(shown, "engine.rod_ratio", 0.2 + 0.01 * k)
-        shown.wait_for_timeout(25)
-    settled(shown)
-    seen = shown.evaluate("window.claimsSeen")
+        slide(problem_page, "engine.rod_ratio", 0.2 + 0.01 * k)
+        problem_page.wait_for_timeout(25)
+    settled(problem_page)
+    seen = problem_page.evaluate("window.claimsSeen")
     assert {claim["isEarlier"] for claim in seen} == {True, False}
     assert all(claim["text"].startswith("Earlier settings: ") == claim["isEarlier"] for claim in seen)
     # a strong claim that bears no mark is about the settings that stood in that moment
@@ -377,28 +379,28 @@ def test_no_claim_is_shown_for_settings_that_it_is_not_about(shown: Page) -> Non
     assert not any(word in text for text in weak for word in ("ptimum", "no design", "proven", "gap"))
 
 
-def test_refused_settings_keep_the_last_valid_result_and_mark_it(shown: Page) -> None:
-    value = settled(shown)
-    figure = shown.locator('[data-number-of="engine.rod_ratio"]')
+def test_refused_settings_keep_the_last_valid_result_and_mark_it(problem_page: Page) -> None:
+    value = settled(problem_page)
+    figure = problem_page.locator('[data-number-of="engine.rod_ratio"]')
     figure.fill("1.4")
     figure.press("Enter")
-    expect(shown.locator("#complaint")).to_contain_text("engine.rod_ratio")
-    expect(shown.locator("#claim")).to_contain_text("Last valid settings: Optimum")
-    expect(shown.locator("[data-role=regret]")).to_have_text("Last valid settings; the new ones are refused.")
-    assert float(shown.locator("#claim").get_attribute("data-value") or "nan") == value
+    expect(problem_page.locator("#complaint")).to_contain_text("engine.rod_ratio")
+    expect(problem_page.locator("#claim")).to_contain_text("Last valid settings: Optimum")
+    expect(problem_page.locator("[data-role=regret]")).to_have_text("Last valid settings; the new ones are refused.")
+    assert float(problem_page.locator("#claim").get_attribute("data-value") or "nan") == value
 
 
 @pytest.mark.parametrize(
     ("typed", "taken"), [("2,5", "2.5"), ("2.5", "2.5"), (",5", "0.5"), ("0,125", "0.125"), ("3", "3")]
 )
-def test_a_comma_is_a_decimal_sign(shown: Page, typed: str, taken: str) -> None:
-    figure = shown.locator(f'[data-number-of="{MASS}"]')
+def test_a_comma_is_a_decimal_sign(problem_page: Page, typed: str, taken: str) -> None:
+    figure = problem_page.locator(f'[data-number-of="{MASS}"]')
     figure.click()
     figure.press("Control+a")
-    shown.keyboard.type(typed)
-    shown.keyboard.press("Enter")
+    problem_page.keyboard.type(typed)
+    problem_page.keyboard.press("Enter")
     expect(figure).to_have_value(taken)
-    assert shown.evaluate("name => laufruhePage.state.edits.get(name)[2]", MASS) == f"{taken} kg"
+    assert problem_page.evaluate("name => laufruhePage.state.edits.get(name)[2]", MASS) == f"{taken} kg"
 
 
 @pytest.mark.parametrize(
@@ -406,19 +408,19 @@ def test_a_comma_is_a_decimal_sign(shown: Page, typed: str, taken: str) -> None:
     [("1,500", '"1,500" can be read as 1500 or as 1.500'), ("2..5", '"2..5" is no number'), ("2 kg", "is no number"),
      ("", "is no number"), ("1,5,0", "is no number")],
 )  # fmt: skip
-def test_ambiguous_and_unreadable_numbers_are_refused(shown: Page, typed: str, said: str) -> None:
-    value = settled(shown)
-    figure = shown.locator(f'[data-number-of="{MASS}"]')
+def test_ambiguous_and_unreadable_numbers_are_refused(problem_page: Page, typed: str, said: str) -> None:
+    value = settled(problem_page)
+    figure = problem_page.locator(f'[data-number-of="{MASS}"]')
     figure.click()
     figure.press("Control+a")
-    shown.keyboard.press("Delete")
-    shown.keyboard.type(typed)
-    shown.keyboard.press("Enter")
-    expect(shown.locator("#complaint")).to_contain_text(said)
-    expect(shown.locator("#complaint")).to_contain_text("It stays at 4 kg")
+    problem_page.keyboard.press("Delete")
+    problem_page.keyboard.type(typed)
+    problem_page.keyboard.press("Enter")
+    expect(problem_page.locator("#complaint")).to_contain_text(said)
+    expect(problem_page.locator("#complaint")).to_contain_text("It stays at 4 kg")
     expect(figure).to_have_attribute("aria-invalid", "true")
-    assert shown.evaluate("laufruhePage.state.edits.size") == 0
-    assert settled(shown) == value
+    assert problem_page.evaluate("laufruhePage.state.edits.size") == 0
+    assert settled(problem_page) == value
 
 
 def test_a_broken_limit_is_marked_as_soon_as_the_slider_has_moved(page: Page) -> None:

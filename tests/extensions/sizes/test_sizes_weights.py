@@ -57,7 +57,7 @@ def solved(problem: Problem) -> Result:
     return laufruhe.solve(problem)
 
 
-def held(problem: Problem, sizes: np.ndarray) -> Problem:
+def with_sizes(problem: Problem, sizes: np.ndarray) -> Problem:
     """Return the problem with these sizes and open unbalances."""
     named = tuple(d for d in problem.decisions if d not in problem.unbalances)
     engine = problem.design(sizes.tolist(), named)
@@ -74,7 +74,7 @@ def test_the_best_sizes_with_the_best_weights_are_proven(solved: Result) -> None
 def test_at_its_sizes_the_cone_program_finds_the_same(solved: Result, problem: Problem) -> None:
     found = {entry.name: entry.value for entry in solved.decisions}
     sizes = np.array([found[d.name] for d in problem.decisions if d not in problem.unbalances])
-    solution = solve_unbalances(held(problem, sizes))
+    solution = solve_unbalances(with_sizes(problem, sizes))
     assert solution.objective.value == pytest.approx(solved.objective.value, rel=1e-6)
     # and no box around them alone has a bound beyond it
     model = SizeModel(problem)
@@ -87,7 +87,7 @@ def test_at_its_sizes_the_cone_program_finds_the_same(solved: Result, problem: P
 
 def test_weights_and_sizes_together_are_never_worse(solved: Result, problem: Problem) -> None:
     sizes = laufruhe.solve(laufruhe.load(FEWER).changed(tolerance=TOLERANCE))
-    weights = solve_unbalances(held(problem, np.array([entry.value for entry in sizes.decisions])))
+    weights = solve_unbalances(with_sizes(problem, np.array([entry.value for entry in sizes.decisions])))
     for less in (weights, sizes):
         assert solved.certificate.lower_bound <= less.objective.value
         assert solved.objective.value <= less.objective.value * (1.0 + TOLERANCE)
@@ -216,7 +216,7 @@ def test_a_weight_beside_the_length_of_the_rod_is_proven() -> None:
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value < 0.9 * without.objective.value
     problem = result.problem
-    solution = solve_unbalances(held(problem, np.array([entry.value for entry in result.decisions[1:]])))
+    solution = solve_unbalances(with_sizes(problem, np.array([entry.value for entry in result.decisions[1:]])))
     assert solution.objective.value == pytest.approx(result.objective.value, rel=1e-6)
 
 

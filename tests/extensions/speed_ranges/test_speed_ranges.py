@@ -99,7 +99,7 @@ def written(folder: Path, more: str = "", seed: int = 0, old: str = "", new: str
     return path
 
 
-def found(path: Path) -> tuple[laufruhe.Problem, Response]:
+def solved_range(path: Path) -> tuple[laufruhe.Problem, Response]:
     problem = laufruhe.load(path)
     extra = problem.extra(SpeedRanges)
     assert extra is not None
@@ -151,7 +151,7 @@ def own_values(problem: laufruhe.Problem, speeds: NDArray[np.float64]) -> NDArra
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_no_speed_of_a_hundred_thousand_exceeds_the_peak(seed: int, tmp_path: Path) -> None:
-    problem, response = found(written(tmp_path, seed=seed))
+    problem, response = solved_range(written(tmp_path, seed=seed))
     speeds = np.linspace(response.span.low, response.span.high, 100_000)
     values = own_values(problem, speeds)
     worst = response.values[response.worst]
@@ -251,11 +251,11 @@ def test_a_curve_holds_at_every_speed(tmp_path: Path) -> None:
 
 def test_the_mean_has_the_shares_of_time(tmp_path: Path) -> None:
     """Equal shares give the mean over speed; a share of one end gives the value near it."""
-    problem, response = found(written(tmp_path))
+    problem, response = solved_range(written(tmp_path))
     speeds = np.linspace(response.span.low, response.span.high, 20_000)
     assert response.mean == pytest.approx(own_values(problem, speeds).mean(), rel=1e-3)
     shares = 'time_shares = [["1500 rpm", 0], ["6990 rpm", 0], ["7000 rpm", 1]]\n'
-    _, late = found(written(tmp_path, shares))
+    _, late = solved_range(written(tmp_path, shares))
     assert late.mean == pytest.approx(late.values[-1], rel=1e-2)
 
 
@@ -266,7 +266,7 @@ def test_an_evaluation_shows_ranges_and_the_state_of_their_curves(tmp_path: Path
     result = laufruhe.evaluate(problem)
     table, peaks = SECTION.tables(result)
     assert [row[:2] for row in table.rows] == [("all", "initial"), ("whole", "initial")]
-    _, response = found(written(tmp_path))
+    _, response = solved_range(written(tmp_path))
     worst = response.values[response.worst]
     assert result.objective is not None
     assert result.objective.name == "worst rms receiver acceleration over whole"
@@ -359,10 +359,10 @@ def test_an_undamped_resonance_is_refused(tmp_path: Path) -> None:
 
 def test_a_limited_range_has_the_peak_of_its_value_too(tmp_path: Path) -> None:
     """A steep limit is tightest far from the largest value, whose peak is found between samples all the same."""
-    _, free = found(written(tmp_path, seed=2))
+    _, free = solved_range(written(tmp_path, seed=2))
     worst = float(free.values[free.worst])
     steep = f'max = [["1500 rpm", "{9e3 * worst} mm/s^2"], ["7000 rpm", "{10.0 * worst} mm/s^2"]]\n'
-    _, limited = found(written(tmp_path, steep, seed=2))
+    _, limited = solved_range(written(tmp_path, steep, seed=2))
     assert limited.tightest != limited.worst == limited.tops[0]
     assert limited.values[limited.worst] == pytest.approx(worst, rel=1e-9)
     assert limited.tightest in limited.tops[:2]
@@ -381,9 +381,9 @@ def test_every_solved_problem_is_a_round(tmp_path: Path) -> None:
 
 
 def test_a_value_that_rises_to_the_end_of_a_range_has_its_peak_there(tmp_path: Path) -> None:
-    _, whole = found(written(tmp_path))
+    _, whole = solved_range(written(tmp_path))
     resonance = RPM * float(whole.speeds[whole.worst])
     narrow = f'["{0.9 * resonance} rpm", "{0.99 * resonance} rpm"]'
-    _, below = found(written(tmp_path, old='["1500 rpm", "7000 rpm"]', new=narrow))
+    _, below = solved_range(written(tmp_path, old='["1500 rpm", "7000 rpm"]', new=narrow))
     assert below.tops[0] == below.worst == len(below.values) - 1
     assert len(below.tops) == 1
