@@ -15,15 +15,21 @@ from typing import Any
 
 import numpy as np
 
-from attack import own_judge
+from attack import newer_families, own_judge, ranged_families
 from attack.crossings import OWN_CROSSINGS, PLAIN_CROSSINGS, best_of_choices, judge_ranks, judge_robust
+from attack.driven_families import FAMILIES as DRIVEN
 from attack.families import moving_mass, toml
 from attack.openings import Openings
 from attack.own_families import OWN_FAMILIES
 from attack.plain_loads import number
 from attack.plain_scene import Table, terms_of
 from attack.rivals import Rival, best_star, convex_rival, least_broken, local_rival
+from laufruhe.errors import InputError, ModelError
 
+REFUSABLE = {*PLAIN_CROSSINGS, *DRIVEN, *ranged_families.FAMILIES, *newer_families.FAMILIES}
+"""Families of which the package may refuse a problem in one line."""
+NEWER = {"speed_ranges", "electric_machines", "receivers"}
+"""Tables that the own model does not know."""
 SAMPLED = 1e-5
 """Relative accuracy of values read from samples of the plain model, beyond the stated error."""
 KINKED = 1e-4
@@ -130,7 +136,7 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
             result = solved(table, folder, f"{family}-{seed}-{os.getpid()}")
     except Exception as error:
         verdict.status = "error"
-        if family in PLAIN_CROSSINGS and type(error).__name__ == "ModelError":
+        if family in REFUSABLE and isinstance(error, InputError | ModelError) and "\n" not in str(error).strip():
             verdict.status = "refused"
             verdict.notes.append(f"note: {str(error)[:150]}")
             return verdict
@@ -144,7 +150,7 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
         verdict.bound = float(result.certificate.lower_bound)
     if family not in OWN_FAMILIES and family not in OWN_CROSSINGS:
         judge(verdict, table, result, rng, maximum)
-    if family not in PLAIN_CROSSINGS and own_judge.knows(table):
+    if family not in REFUSABLE and not NEWER & table.keys() and own_judge.knows(table):
         judge_by_own(verdict, table, result, rng, maximum)
     verdict.own_seconds = time.perf_counter() - started
     return verdict
@@ -160,6 +166,9 @@ def judge_by_own(verdict: Verdict, table: Table, result: Any, rng: np.random.Gen
 
 def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, maximum: int) -> None:
     """Add complaints about a result."""
+    if "speed_ranges" in table:
+        ranged_families.judge(verdict, table, result, rng, maximum, KINKED if "gas" in table else SAMPLED)
+        return
     if result.certificate is not None and (isinstance(table["objective"], list) or "robust" in table):
         verdict.status, verdict.kind = result.status.value, result.certificate.kind.value
         verdict.gap = result.certificate.gap
@@ -220,8 +229,10 @@ def _size(table: Table) -> float:
 
 def _limits_read(result: Any, scene: Any) -> Iterator[tuple[Table, Any, float]]:
     """Yield the limits, and what the plain model says of the final design."""
-    for entry, limit in zip(scene.table.get("constraints", []), result.limits, strict=False):
-        if entry["limit"] != "natural frequencies" and entry.get("name") == limit.name:
+    limits = {limit.name: limit for limit in result.limits}
+    for entry in scene.table.get("constraints", []):
+        if entry["limit"] != "natural frequencies" and entry.get("name") in limits:
+            limit = limits[entry["name"]]
             yield entry, limit, scene.measure({**entry, "quantity": entry["limit"]})
 
 

@@ -20,7 +20,9 @@ from attack.plain_loads import number
 from attack.plain_scene import Table, norm_and_channel, smallest_ball, terms_of
 
 Plane = tuple[float, np.ndarray]
-STEPS = {"mean": 8, "worst mean": 8, "rms": 8, "rmq": 8, "maximum": 2, "peak to peak": 2}
+STEPS = {
+    "mean": 8, "worst mean": 8, "rms": 8, "worst rms": 8, "rmq": 8, "worst rmq": 8, "maximum": 2, "peak to peak": 2,
+}  # fmt: skip
 LEVEL = 0.4
 
 
@@ -55,6 +57,12 @@ class Load:
         if self.norm == "worst mean":
             ways = np.einsum("kjnd,kjndq->kq", along, self.slopes) / (length.shape[1] * length.shape[2])
             return [(float(length[k].mean()), ways[k]) for k in np.flatnonzero(self.share)]
+        if self.norm.startswith("worst"):
+            power = {"worst rms": 2, "worst rmq": 4}[self.norm]
+            values = (length**power).mean(axis=(1, 2)) ** (1.0 / power)
+            ways = np.einsum("kjn,kjnd,kjndq->kq", length ** (power - 2), rows, self.slopes)
+            ways /= (length.shape[1] * length.shape[2] * np.where(values > 0.0, values, 1.0) ** (power - 1))[:, None]
+            return [(float(values[k]), ways[k]) for k in np.flatnonzero(self.share)]
         weights = self.share[:, None, None] / (length.shape[1] * length.shape[2])
         if self.norm == "mean":
             return [

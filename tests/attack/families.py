@@ -22,7 +22,8 @@ Generator = np.random.Generator
 LOADS = ("mount force", "shaking force", "rocking couple", "roll moment")
 NORMS = ("mean", "maximum", "rms", "peak to peak")
 UNITS = {"mount force": "N", "shaking force": "N", "rocking couple": "N m", "roll moment": "N m", "mount travel": "m",
-         "main-bearing force": "N", **SIZED}  # fmt: skip
+         "main-bearing force": "N", "receiver acceleration": "m/s^2", "receiver velocity": "m/s", "stored work": "J",
+         **SIZED}  # fmt: skip
 
 
 def q(value: float, unit: str, digits: int = 6) -> str:
@@ -183,7 +184,7 @@ def moving_mass(engine: Table) -> float:
     throw_count = len(angles) if isinstance(angles, list) else engine.get("cylinders", 1)
     if engine["layout"] == "parts":
         throw_count = len(engine["slider_cranks"])
-    return count * throw_count * middle(engine["reciprocating_mass"]) * 0.5 * float(engine["stroke"].split()[0])
+    return count * throw_count * middle(engine["reciprocating_mass"]) * 0.5 * middle(engine["stroke"])
 
 
 def rigid_mounts(rng: Generator) -> Table:
@@ -973,7 +974,7 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
     from attack.rivals import convex_rival, stars_of
 
     openings = Openings(table)
-    if openings.numbers or "constraints" in table or rng.random() > share:
+    if openings.numbers or "constraints" in table or "speed_ranges" in table or rng.random() > share:
         return table
     star = next(iter(stars_of(openings)), None)
     if star is None:
@@ -999,9 +1000,12 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
 
 def family_of(name: str) -> Callable[[Generator], Table]:
     """Return the function that makes the problems of a family."""
+    from attack.driven_families import FAMILIES as DRIVEN
+    from attack.newer_families import FAMILIES as NEWER
+    from attack.ranged_families import FAMILIES as RANGED
     from attack.single_families import FAMILIES as SINGLE
 
-    return {**FAMILIES, **SINGLE}[name]
+    return {**FAMILIES, **SINGLE, **DRIVEN, **RANGED, **NEWER}[name]
 
 
 def problem(family: str, seed: int) -> tuple[Table, Generator]:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from attack import plain_electric
 from attack.plain_loads import number
 from attack.plain_scene import Scene, Table
 
@@ -78,7 +79,8 @@ class Openings:
     """A problem's table with its open numbers as a vector."""
 
     def __init__(self, table: Table) -> None:
-        self.table = table
+        limits = [*table.get("constraints", []), *plain_electric.limits(table)]
+        self.table = {**table, "constraints": limits} if "electric_machines" in table else table
 
     @cached_property
     def weights(self) -> tuple[Weight, ...]:
@@ -98,6 +100,8 @@ class Openings:
                 rows.append(
                     self._weight(entry, (*where, "unbalances", j), where, float(shaft["ratio"]), "b", tuple(rows))
                 )
+        for name, order, largest in plain_electric.open_torques(self.table):
+            rows.append(Weight(name, (), None, order, 1.0, plain_electric.ROLE, 0.0, largest, None))
         return tuple(rows)
 
     def _listed(self, key: str) -> list[tuple[int, Table]]:
@@ -138,7 +142,7 @@ class Openings:
         for key in OPEN_TABLES:
             if key == "engine" and steps:
                 # angles of stars are chosen and not moved
-                for name in ("reciprocating_mass", "rod_length"):
+                for name in ("reciprocating_mass", "rod_length", "displacer_mass"):
                     look(self.table["engine"].get(name), (key, name))
             else:
                 look(self.table.get(key), (key,))
@@ -201,6 +205,9 @@ class Openings:
     def _rotors(self, table: Table, vector: np.ndarray) -> list[tuple[Any, ...]]:
         rotors: dict[str, tuple[Any, ...]] = {}
         for w, part in self.parts(vector):
+            if w.role == plain_electric.ROLE:
+                rotors[w.name] = (w.name, 0.0, 0j, w.ratio, w.unbalance(part), w.radius, w.role)
+                continue
             entry = _at(table, w.where)
             y, z = (number(v) for v in _at(table, w.shaft)["position"]) if w.shaft else (0.0, 0.0)
             if w.follows:
@@ -225,6 +232,8 @@ class Openings:
         ]
         for w in self.weights:
             u = rotors[w.name].unbalance if w.name in rotors else 0j
+            if w.role == plain_electric.ROLE:
+                u = decisions[f"{w.name}.torque"] * cmath.exp(1j * decisions[f"{w.name}.angle"])
             if w.entries == 2:
                 values += [u.real / w.maximum, u.imag / w.maximum]
             elif w.entries == 1:
@@ -262,10 +271,14 @@ class Openings:
     def _number(self, path: Path, engine: Any, rotors: dict[str, Any], decided: dict[str, float]) -> float:
         if path[-1] == "lead":
             return math.degrees(decided[f"{_at(self.table, path[:-1])['name']}.lead"])
-        if path[0] == "running_gear" or path[:2] == ("engine", "big_end") or path == ("engine", "rod_length"):
+        if (
+            path[0] == "running_gear"
+            or path[:2] == ("engine", "big_end")
+            or path in (("engine", "rod_length"), ("engine", "stroke"), ("engine", "offset"))
+        ):
             return decided[".".join(path)]
-        if path == ("engine", "reciprocating_mass"):
-            return decided["reciprocating mass"]
+        if path in (("engine", "reciprocating_mass"), ("engine", "displacer_mass")):
+            return decided[path[1].replace("_", " ")]
         if path[0] == "main_bearings":
             return decided[f"{_at(self.table, path[:-1])['name']}.{path[-1]}"]
         if path[-1] == "crank_lead":

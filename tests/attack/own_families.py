@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 
 import numpy as np
 
+from attack.driven_engines import DRIVES
 from attack.families import (
     Generator,
     balancers,
@@ -36,7 +38,7 @@ def unit_of(quantity: str) -> str:
     return next((unit for name, unit in UNITS.items() if quantity.endswith(name)), "")
 
 
-def scene(rng: Generator, most_points: int, plain: bool) -> Table:
+def scene(rng: Generator, most_points: int, plain: bool, drive: str = "") -> Table:
     """Return the engine, gas, points and a block on mounts, all given; `plain` has nothing that no bound knows."""
     chance = rng.random()
     engine = gas_engine(rng) if chance < 0.5 else (inline, vee, boxer)[int(rng.integers(3))](rng)
@@ -55,11 +57,20 @@ def scene(rng: Generator, most_points: int, plain: bool) -> Table:
         for k in range(int(rng.integers(1, most_points + 1)))
     ]  # fmt: skip
     table: Table = {"engine": engine, "operating_points": points, "block": mass, "mounts": mounts(rng, mirrored, plain)}
-    if chance < 0.42:
+    if drive:
+        table["engine"] = without_gas(DRIVES[drive](rng, engine))
+    elif chance < 0.42:
         table["gas"] = gas(rng)
         if len(points) > 1 and rng.random() < 0.5:
             points[1] |= {"gas": False} if rng.random() < 0.5 else {"motored": True}
     return table
+
+
+def without_gas(engine: Table) -> Table:
+    """An engine of a drive, all given."""
+    rest = {key: value for key, value in engine.items() if key != "bore"}
+    displacer = engine.get("displacer_mass")
+    return {**rest, "displacer_mass": displacer["start"]} if isinstance(displacer, dict) else rest
 
 
 def gas(rng: Generator) -> Table:
@@ -233,10 +244,10 @@ def objective(entry: Table) -> Table:
     return {"minimise": entry["quantity"], **{key: value for key, value in entry.items() if key != "quantity"}}
 
 
-def any_mounts(rng: Generator) -> Table:
+def any_mounts(rng: Generator, drive: str = "") -> Table:
     """Return a problem with any open numbers of mounts and weights, any quantity, and up to three limits."""
     plain = rng.random() < 0.5
-    table = scene(rng, 3, plain)
+    table = scene(rng, 3, plain, drive)
     if rng.random() < 0.3:
         load_cases(rng, table)
     allowed = ["stiffness", "position", "turned", "weight", "loss", "damping", "lag"]
@@ -256,9 +267,9 @@ def any_mounts(rng: Generator) -> Table:
     return {**table, "search": {"boxes": 20, "starts": 5}}
 
 
-def run_ups(rng: Generator) -> Table:
+def run_ups(rng: Generator, drive: str = "") -> Table:
     """Return a problem with a run-up limited or minimised, with stiffness or a weight open."""
-    table = scene(rng, 1, True)
+    table = scene(rng, 1, True, drive)
     top = si(table["operating_points"][0]["speed"])
     durations = {key: q(rng.uniform(0.3, 0.8), "s", 3) for key in ("time", "shut_down_time")}
     table["run_up"] = {"up_to": q(min(top, 250.0) * rng.uniform(0.6, 1.0), "rad/s"), **durations}
@@ -281,4 +292,12 @@ def run_ups(rng: Generator) -> Table:
     return {**table, "search": {"boxes": 60, "starts": 3}}
 
 
-OWN_FAMILIES = {"any mounts": any_mounts, "run-ups": run_ups}
+def driven(made: Callable[[Generator, str], Table]) -> Callable[[Generator], Table]:
+    """The same of engines whose pistons a linkage drives."""
+    return lambda rng: made(rng, str(rng.choice(list(DRIVES))))
+
+
+OWN_FAMILIES = {
+    "any mounts": any_mounts, "run-ups": run_ups, "driven mounts": driven(any_mounts),
+    "driven run-ups": driven(run_ups),
+}  # fmt: skip

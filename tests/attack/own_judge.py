@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import differential_evolution, minimize
 
 from attack.own_loads import Table
-from attack.own_problem import OwnModel, open_numbers_of
+from attack.own_problem import OwnModel, is_open, open_numbers_of
 from attack.own_runs import MEASURES as OF_RUNS
 from attack.plain_scene import terms_of
 
@@ -28,12 +28,13 @@ EXCESS = 1.1e-6
 ROUNDED = 1e-13
 """Share of the value of the design as given under which a value is nought."""
 LAYOUTS = ("inline", "vee", "boxer")
+LINKAGES = ("crank-rocker", "rhombic")
 POINTS = {"name", "speed", "weight", "imep", "motored", "gas"}
 
 
 def knows(table: Table) -> bool:
     """Return True if the own model covers a file: elastic mounts, alone or with unbalances, of its layouts."""
-    engine, model = table["engine"], table.get("gas", {}).get("model", "wiebe")
+    engine, model = table["engine"], table.get("gas", {}).get("model")
     has_throws = isinstance(engine.get("throws"), list) and all(isinstance(t, int | float) for t in engine["throws"])
     points = {key for point in table["operating_points"] for key in point}
     fluid = any("fluid_track" in place for place in table["mounts"].get("places", []))
@@ -41,8 +42,9 @@ def knows(table: Table) -> bool:
     return (
         points <= POINTS and not measured and not (fluid and "run_up" in table)
         and table["mounts"].get("kind") == "elastic" and has_throws
-        and engine["layout"] in LAYOUTS and "drive" not in engine
-        and model in ("wiebe", "seiliger") and "torsion" not in table
+        and engine["layout"] in LAYOUTS and (engine.get("drive") in (None, *LINKAGES))
+        and ("drive" not in engine or not (model or any(is_open(value) for value in engine.values())))
+        and model in (None, "wiebe", "seiliger") and "torsion" not in table
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from attack import own_loads, own_runs
+from attack import own_loads, own_runs, plain_loads
 from attack.own_loads import Table, si
 from attack.own_mounts import GRAVITY, Blocks, blocks
 from attack.plain_scene import norm_and_channel, smallest_ball
@@ -104,7 +104,8 @@ class OwnModel:
         self.turns = own_loads.turns_of(table["engine"])
         self.points: list[Table] = list(table["operating_points"])
         self.speeds = [si(p["speed"]) for p in self.points]
-        self.cylinders, self.pins = own_loads.cylinders_and_pins(table["engine"])
+        self.has_links = "drive" in table["engine"]
+        self.cylinders, self.pins = ([], []) if self.has_links else own_loads.cylinders_and_pins(table["engine"])
 
     @property
     def box(self) -> np.ndarray:
@@ -121,12 +122,15 @@ class OwnModel:
         rows = []
         engine = self.table["engine"]
         throws = [math.radians(float(t)) for t in engine["throws"]]
-        radius = self.cylinders[0].radius
         for entry in self.table.get("counterweights", []):
             if "balance_factor" in entry:
                 for k in entry.get("throws", range(1, len(throws) + 1)):
                     x, throw, turning = self.pins[k - 1]
-                    rest = {**entry, "turning": turning, "shares": si(engine["reciprocating_mass"]) * radius}
+                    rest = {
+                        **entry,
+                        "turning": turning,
+                        "shares": si(engine["reciprocating_mass"]) * self.cylinders[0].radius,
+                    }
                     rows.append(Weight(f"{entry['name']} {k}", x, 0j, 1.0, rest, throw + math.pi, "c"))
                 continue
             x, turned = entry.get("x"), 0.0
@@ -159,6 +163,11 @@ class OwnModel:
     def inertia(self) -> np.ndarray:
         """Return the coefficients (harmonics, 6) of pistons, rods and throws at 1 rad/s."""
         count = own_loads.HIGHEST + 1 if "gas" in self.table else 64 * self.turns + 1
+        if self.has_links:
+            # linkages are those of the plain model, with the half of every order but the mean
+            unit = 2.0 * plain_loads.engine_spectrum(plain_loads.machine(self.table["engine"]))[:count]
+            unit[0] *= 0.5
+            return unit
         unit = own_loads.of_pistons(self.cylinders, self.turns, count)
         for x, throw, turning in self.pins:
             one, _ = own_loads.of_unbalance(x, 0j, 1.0, self.turns, count)

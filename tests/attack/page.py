@@ -38,6 +38,12 @@ FAMILIES = {
     "convex mounts": ("convex-mounts", "elastic-balance"),
     "mounts and unbalances together": ("joint",),
     "any number of elastic mounts": ("any mounts", "run-ups"),
+    "crank-rockers and rhombic drives": ("crank-rockers", "rhombic drives", "driven mounts", "driven run-ups"),
+    "ranges of speed": ("speed ranges", "speed ranges crossed"),
+    "electric machines": ("electric machines",),
+    "receivers": ("receivers",),
+    "motion of pistons": ("piston motion",),
+    "patterns of firings": ("skip fire",),
     "sizes of the running gear with unbalances": ("sizes",),
     "two kinds together": tuple(CROSSINGS),
 }
@@ -63,6 +69,11 @@ Of elastic mounts an **own model** judges as well: written again from the equati
 root mean squares to 1e-9 of the package's. Evolution, sequential quadratic programs and simplexes look at some
 thousands of its designs. It alone judges *any mounts* (places, angles, dampers, loss, mirrored and joined springs,
 fluid tracks, load cases on bump stops, decoupling, windows of frequencies) and *run-ups*.
+
+*Crank-rockers* and *rhombic drives* take the place of the slider-cranks of any other family; a problem that cannot be
+stated with them must be refused in one line, and counts as *refused*. A *range of speed* is judged by a program of our
+own at some of its speeds and by values at many, with the peaks between them. *Patterns of firings* are all words of
+their length, one by one, as pulses of torque added over time.
 
 - *Prices* lie between the gain of a limit loosened by 1 % and the loss of one tightened by 1 %.
 - *Monotony*: a limit loosened by 5 %, or one weight more, is not worse.

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from attack.plain_electric import on_crank_and_block
 from attack.plain_loads import (
     ATMOSPHERE,
     FINE,
@@ -24,12 +25,14 @@ from attack.plain_loads import (
     Machine,
     Mechanism,
     angles,
+    energy_of,
     number,
     piston,
     rod_end,
     seiliger,
     shank_of,
     slope,
+    travel,
 )
 from attack.plain_rotary import on_eccentric
 from attack.plain_rotary import torque as rotor_torque
@@ -70,6 +73,8 @@ def at(scene: Any, machine: Machine, channel: str, k: int) -> np.ndarray:
     if channel == "shaft twist":
         return _twist(scene, machine, torques, speed)
     total = np.sum(torques, axis=0)
+    if channel == "stored work" and "electric_machines" in scene.table:
+        total = total + on_crank_and_block(scene, scene.points[k])[0]
     signal = total if channel == "crank torque" else _integral(total - total.mean(), machine.turns)
     return signal[None, :, None]
 
@@ -87,10 +92,9 @@ def _moving(m: Mechanism, turns: int) -> tuple[np.ndarray, np.ndarray]:
     return base, piston(base, m.rod, m.bank, m.offset)[1]
 
 
-def _between(m: Mechanism, turns: int, share: float) -> np.ndarray:
-    """Return a place on the rod, so far from the crank pin."""
-    base, end = _moving(m, turns)
-    return base + share * (end - base)
+def _velocity(m: Mechanism, turns: int) -> np.ndarray:
+    """Return the velocity of the piston along its axis, by the crank angle."""
+    return slope(travel(m, m.ratio * angles(turns) + m.throw - m.bank), turns).real
 
 
 def _pressing(m: Mechanism, turns: int, gas: dict[str, Any] | None) -> np.ndarray:
@@ -138,6 +142,14 @@ def pressing_rod(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | N
     return _pressing(m, turns, gas) - inertia + 1j * _pushed(m, turns, speed, gas)[0]
 
 
+def side_force(m: Mechanism, turns: int, speed: float) -> np.ndarray:
+    """Return the force of the wall on a piston without gas, with what turns its rod beside two masses [N]."""
+    base, end = _moving(m, turns)
+    turned = slope(slope(piston(base, m.rod, m.bank, m.offset)[2], turns), turns).real
+    reach = _cross(end - base, 1j * np.exp(1j * m.bank) * np.ones(len(base)))
+    return _pushed(m, turns, speed, None)[0] + m.deficit * speed**2 * turned / reach
+
+
 def on_pin(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None) -> np.ndarray:
     """Return the force of the rod on its pin [N]."""
     if m.shape is not None:
@@ -176,12 +188,7 @@ def torque_of(m: Mechanism, turns: int, speed: float, gas: dict[str, Any] | None
     if m.shape is not None:
         fired = np.mod(angles(turns) - (m.fires or 0.0), 2.0 * np.pi)
         return np.interp(fired, angles(1, FINE), rotor_torque(gas, m), period=2.0 * np.pi) if gas else np.zeros(SAMPLES)
-    _, end = _moving(m, turns)
-    velocity = slope(end, turns)
-    energy = 0.5 * m.piston_mass * np.abs(velocity) ** 2
-    for share, mass in shank_of(m):
-        energy += 0.5 * mass * np.abs(slope(_between(m, turns, share), turns)) ** 2
-    return -(speed**2) * slope(energy, turns).real + _pressing(m, turns, gas) * velocity.real
+    return -(speed**2) * slope(energy_of(m, turns), turns).real + _pressing(m, turns, gas) * _velocity(m, turns)
 
 
 def _integral(torque: np.ndarray, turns: int) -> np.ndarray:
@@ -199,9 +206,9 @@ def _uneven(scene: Any, machine: Machine, k: int, wheel: float) -> float:
             inertia += m.shape.inertia / 9.0
             torque += torque_of(m, turns, speed, gas)
             continue
-        velocity = slope(_moving(m, turns)[1], turns)
-        inertia += m.piston_mass * np.abs(velocity) ** 2
-        torque += _pressing(m, turns, gas) * velocity.real
+        inertia += 2.0 * energy_of(m, turns)
+        torque += _pressing(m, turns, gas) * _velocity(m, turns)
+    torque = torque + on_crank_and_block(scene, scene.points[k])[0]
     work = _integral(torque - torque.mean(), turns)
 
     def mean_over_speed(energy: float) -> float:
@@ -221,7 +228,7 @@ def _twist(scene: Any, machine: Machine, torques: list[np.ndarray], speed: float
     # cylinders are listed from the front; what turns beside their rods is at the crank radius
     discs = []
     for m in machine.mechanisms:
-        swinging = m.piston_mass * float(np.mean(np.abs(slope(_moving(m, turns)[1], turns)) ** 2))
+        swinging = 2.0 * float(np.mean(energy_of(m, turns)))
         discs.append(number(keys["throw_inertia"]) + m.pin_mass * m.radius**2 + swinging)
     inertia = np.array([*discs, number(keys["discs"][0]["inertia"])])
     size = len(inertia)

@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from attack import plain_drives
+
 # more of them resolve the bends of gas torque better
 SAMPLES = int(os.environ.get("ATTACK_SAMPLES", "4096"))
 # highest order of crank speed; higher ones are below rounding
@@ -84,6 +86,9 @@ class Mechanism:
     centre: complex = 0j
     knuckle: Knuckle | None = None
     lever: Lever | None = None
+    linkage: plain_drives.Linkage | None = None
+    displacer_mass: float | None = None
+    """Mass at a second rod on the pin; None without one."""
     shape: Shape | None = None
     partner: tuple[float, float, float] | None = None
     """Radius and rod of another piston in the same cylinder, and by how much it comes first."""
@@ -92,6 +97,9 @@ class Mechanism:
     """Mass of a straight rod between its pins."""
     fires: float | None = None
     """Crank angle of its firing; None for one without gas of its own."""
+
+
+Weights = list[tuple[float, np.ndarray]]
 
 
 def angles(turns: int, samples: int = SAMPLES) -> np.ndarray:
@@ -135,27 +143,54 @@ def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
     phi, out = angles(turns), np.zeros((SAMPLES, 6))
     base = rod_end(m, phi)
     energy = np.zeros(SAMPLES)
-    if m.shape is not None:
-        # it turns evenly about its centre
-        masses, deficit, swing = [(m.piston_mass, base)], 0.0, phi
-    elif m.lever is None:
-        _, end, swing = piston(base, m.rod, m.bank, m.offset)
-        masses, deficit = [(m.piston_mass, end)], m.deficit
-        masses += [(mass, base + share * (end - base)) for share, mass in shank_of(m)]
-    else:
-        masses, swing = lever_masses(m, m.lever, base)
-        deficit = m.lever.inertia
+    masses, swings = moving(m, base)
     for mass, place in ((mass, place + m.centre) for mass, place in (*masses, (m.pin_mass, base))):
         velocity = slope(place, turns)
         force = -mass * slope(velocity, turns)
         energy += 0.5 * mass * np.abs(velocity) ** 2
         out += force_at(m.x, place, force)
-    if deficit:
-        rate = slope(swing, turns).real
-        energy += 0.5 * deficit * rate**2
-        out[:, 3] += deficit * slope(rate, turns).real
+    for inertia, angle in swings:
+        if inertia:
+            rate = turning(angle, turns)
+            energy += 0.5 * inertia * rate**2
+            out[:, 3] += inertia * slope(rate, turns).real
     out[:, 3] -= slope(energy, turns).real
     return out
+
+
+def moving(m: Mechanism, base: np.ndarray) -> tuple[Weights, Weights]:
+    """Masses with their places but that of the pin at `base`, and inertias with the angles of their bodies."""
+    axis = np.exp(1j * m.bank)
+    if m.shape is not None:
+        # it turns evenly about its centre
+        return [(m.piston_mass, base)], []
+    if m.lever is not None:
+        masses, angle = lever_masses(m, m.lever, base)
+        return masses, [(m.lever.inertia, angle)]
+    if m.linkage is not None:
+        masses, swings = plain_drives.rocker_masses(m.linkage, base / axis, m.piston_mass)
+        return [(mass, axis * place) for mass, place in masses], swings
+    if m.displacer_mass is not None:
+        both = m.piston_mass, m.displacer_mass
+        masses, swings = plain_drives.rhombic_masses(base / axis, m.rod, m.offset, both, m.deficit)
+        return [(mass, axis * place) for mass, place in masses], swings
+    _, end, swing = piston(base, m.rod, m.bank, m.offset)
+    masses = [(m.piston_mass, end)]
+    masses += [(mass, base + share * (end - base)) for share, mass in shank_of(m)]
+    return masses, [(m.deficit, swing)]
+
+
+def turning(angle: np.ndarray, turns: int) -> np.ndarray:
+    """Rate of an angle that may gain whole turns over the cycle."""
+    gained = round((2.0 * angle[-1] - angle[-2] - angle[0]) / (2.0 * np.pi)) / turns
+    return slope(angle - gained * angles(turns, len(angle)), turns).real + gained
+
+
+def energy_of(m: Mechanism, turns: int) -> np.ndarray:
+    """Kinetic energy at unit speed, without what turns with the pin."""
+    masses, swings = moving(m, rod_end(m, angles(turns)))
+    energy = np.sum([0.5 * mass * np.abs(slope(place, turns)) ** 2 for mass, place in masses], axis=0)
+    return energy + sum(0.5 * inertia * turning(angle, turns) ** 2 for inertia, angle in swings if inertia)
 
 
 def lever_masses(m: Mechanism, lever: Lever, base: np.ndarray) -> tuple[list[tuple[float, np.ndarray]], np.ndarray]:
@@ -189,20 +224,37 @@ def rotor_load(x: float, place: complex, ratio: float, unbalance: complex, turns
 
 def travel(m: Mechanism, alpha: np.ndarray) -> np.ndarray:
     """Return the place of the piston along its cylinder at its own crank angles."""
-    return piston(m.radius * np.exp(1j * alpha), m.rod, 0.0, m.offset)[0]
+    pin = m.radius * np.exp(1j * alpha)
+    return piston(pin, m.rod, 0.0, m.offset)[0] if m.linkage is None else plain_drives.rocker_travel(m.linkage, pin)
 
 
-def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
-    """Return the absolute pressure on a fine grid of one cycle from the firing dead centre, cut-off by search."""
-    alpha = angles(turns, FINE)
-    s = travel(m, alpha)
-    top, bottom = (math.asin(m.offset / (m.rod + m.radius)), math.pi + math.asin(m.offset / (m.rod - m.radius)))
+def top_and_bottom(m: Mechanism) -> tuple[float, float]:
+    """Own crank angles of the highest place of the piston, and of the lowest after it."""
+    if m.linkage is not None:
+        centres = plain_drives.rocker_dead_centres(m.linkage, m.radius)
+        assert centres is not None
+        return centres[:2]
+    if not m.rod:
+        return 0.0, math.pi
+    return math.asin(m.offset / (m.rod + m.radius)), math.pi + math.asin(m.offset / (m.rod - m.radius))
+
+
+def strokes_of(m: Mechanism, turns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Part of the stroke from the highest place, and strokes since firing, on a fine grid from own crank angle 0."""
+    phi, (top, bottom) = angles(turns, FINE), top_and_bottom(m)
+    s = travel(m, m.ratio * phi)
     highest, lowest = travel(m, np.array([top, bottom]))
-    since, down, up = np.mod(alpha - top, 2.0 * np.pi * turns), bottom - top, 2.0 * np.pi
+    since, up = np.mod(phi - m.ratio * top, 2.0 * np.pi * turns), 2.0 * np.pi
+    down = (m.ratio * (bottom - top)) % up
     strokes = np.select(
         [since < down, since < up, since < up + down], [since / down, np.full_like(s, 1.5), np.full_like(s, 2.5)], 3.5
     )
-    return mixed_cycle(gas, (highest - s) / (highest - lowest), strokes, 2 * turns)
+    return (highest - s) / (highest - lowest), strokes
+
+
+def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
+    """Absolute pressure on a fine grid of one cycle from own crank angle 0; the cut-off is found by trying."""
+    return mixed_cycle(gas, *strokes_of(m, turns), 2 * turns)
 
 
 def mixed_cycle(gas: dict[str, Any], share: np.ndarray, strokes: np.ndarray, whole: int) -> np.ndarray:
@@ -235,20 +287,16 @@ def unfired(gas: dict[str, Any], valves: str, m: Mechanism, turns: int) -> np.nd
     """Return the absolute pressure without combustion, as `seiliger`, with valves that move, stay closed or open."""
     e, n = (gas.get(k, DEFAULTS[k]) for k in ("compression_ratio", "compression_exponent"))
     intake, exhaust = number(gas.get("intake_pressure", ATMOSPHERE)), number(gas.get("exhaust_pressure", ATMOSPHERE))
-    s = travel(m, angles(turns, FINE))
-    v = 1.0 / (e - 1.0) + (s.max() - s) / np.ptp(s)
+    share, strokes = strokes_of(m, turns)
+    v = 1.0 / (e - 1.0) + share
     if valves == "open":
         return np.full_like(v, intake)
-    squeezed = intake * (v.max() / v) ** n
+    squeezed = intake * (e / (e - 1.0) / v) ** n
     if valves == "closed" or turns == 1:
         return squeezed
     # down from the firing dead centre, up and out, down and in, up
-    k, eighth = np.arange(FINE), FINE // 8
-    lowest, highest = eighth + np.argmin(s[eighth : 3 * eighth]), 3 * eighth + np.argmax(s[3 * eighth : 5 * eighth])
-    return np.select(
-        [(k > lowest) & (k <= highest), (k > highest) & (k <= FINE // 2 + lowest)],
-        [np.full_like(v, exhaust), np.full_like(v, intake)], squeezed,
-    )  # fmt: skip
+    out, back = (strokes >= 1.0) & (strokes < 2.0), (strokes >= 2.0) & (strokes < 3.0)
+    return np.select([out, back], [np.full_like(v, exhaust), np.full_like(v, intake)], squeezed)
 
 
 ATMOSPHERE = 101325.0
@@ -268,7 +316,7 @@ def gas_torque(gas: dict[str, Any], m: Mechanism, turns: int, valves: str = "") 
     area = 0.25 * math.pi * m.bore**2
     pressure = unfired(gas, valves, m, turns) if valves else seiliger(gas, m, turns)
     over = pressure - number(gas.get("crankcase_pressure", ATMOSPHERE))
-    rise = slope(travel(m, angles(turns, FINE)).astype(complex), turns).real
+    rise = slope(travel(m, m.ratio * angles(turns, FINE)).astype(complex), turns).real
     return np.fft.rfft(-area * over * rise)[: SAMPLES // 2 + 1] / FINE
 
 
@@ -315,7 +363,7 @@ def chamber_pressure(entry: dict[str, Any], x: np.ndarray, grows: np.ndarray) ->
 
 def chambers_torque(gas: dict[str, Any], k: int, m: Mechanism) -> np.ndarray:
     """Return coefficients of the roll moment of all chambers of cylinder k, its own crank angle counted from zero."""
-    s = travel(m, angles(1, FINE))
+    s = travel(m, m.ratio * angles(1, FINE))
     rise = slope(s.astype(complex), 1).real
     x = (s.max() - s) / np.ptp(s)
     force = np.zeros(FINE)
@@ -362,6 +410,11 @@ def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[
     entry = {**engine, **(part or {})}
     if entry.get("drive") == "swinging-yoke":
         return _yoke(entry)
+    if entry.get("drive") == "crank-rocker":
+        links = plain_drives.linkage(number, entry)
+        radius, bore = plain_drives.rocker_radius(links, number(entry["stroke"])), number(entry.get("bore", 0.0))
+        mass = number(entry["reciprocating_mass"])
+        return {"radius": radius, "rod": 0.0, "piston_mass": mass, "bore": bore, "linkage": links}
     offset, deficit = number(entry.get("offset", 0.0)), number(entry.get("rod_inertia_deficit", 0.0))
     rod = number(entry["rod_length"])
     stroke = number(entry["stroke"])
@@ -376,6 +429,7 @@ def _common(engine: dict[str, Any], part: dict[str, Any] | None = None) -> dict[
         "radius": radius, "rod": rod, "deficit": deficit, "offset": offset, "bore": number(entry.get("bore", 0.0)),
         "piston_mass": number(entry["reciprocating_mass"]) + entry.get("at_piston", 0.0),
         "shank": entry.get("shank", 0.0),
+        "displacer_mass": number(entry["displacer_mass"]) if entry.get("drive") == "rhombic" else None,
     }  # fmt: skip
 
 
@@ -464,13 +518,15 @@ def _in_banks(e: dict[str, Any], banks: int, per_throw: int, angle: float, split
         parts.append(Mechanism(x, throws[pin] - side * split, side * angle + lean, pin_mass=pin_of, **numbers))
     if per_throw == 1:
         return parts
-    still = {**common, "piston_mass": 0.0, "deficit": 0.0, "bore": 0.0, "offset": 0.0, "shank": 0.0}
+    still = {
+        "radius": common["radius"], "rod": common["rod"] or 10.0 * common["radius"], "piston_mass": 0.0
+    }  # fmt: skip
     return parts + [Mechanism(x, t, 0.0, pin_mass=m, **still) for (m, x), t in zip(turning, throws, strict=True)]
 
 
 def dead_centres(mechanisms: list[Mechanism]) -> list[float]:
     """Return the angle of every crank at the top of its piston where these differ, else none."""
-    tops = [math.asin(m.offset / (m.rod + m.radius)) if m.rod else 0.0 for m in mechanisms]
+    tops = [top_and_bottom(m)[0] for m in mechanisms]
     return tops if max(tops) - min(tops) > 1e-12 else [0.0] * len(tops)
 
 
@@ -626,7 +682,7 @@ def gas_spectrum(gas: dict[str, Any], engine: Machine, valves: dict[int, str] | 
         for k, m in enumerate(engine.mechanisms):
             if any(k + 1 in row.get("cylinders", [k + 1]) for row in gas["chambers"]) and m.piston_mass:
                 once = chambers_torque(gas, k, m)[: SAMPLES // 2 // engine.turns + 1]
-                phases = np.exp(1j * orders[:: engine.turns, 0][: len(once)] * (m.throw - m.bank))
+                phases = np.exp(1j * orders[:: engine.turns, 0][: len(once)] * (m.throw - m.bank) / m.ratio)
                 total[:: engine.turns, 3][: len(once)] += once * phases
     if gas["model"] == "chambers":
         return total

@@ -13,17 +13,27 @@ from typing import Any
 
 import numpy as np
 
-from attack import plain_crankcase, plain_gear, plain_loads, plain_mounts, plain_rotary
+from attack import (
+    plain_crankcase,
+    plain_electric,
+    plain_gear,
+    plain_loads,
+    plain_motion,
+    plain_mounts,
+    plain_receivers,
+    plain_rotary,
+)
 from attack.plain_loads import SAMPLES, number
 
 Table = dict[str, Any]
-NORMS = ("mean", "maximum", "rms", "peak to peak", "worst mean", "rmq")
+NORMS = ("mean", "maximum", "rms", "peak to peak", "worst mean", "rmq", "worst rms", "worst rmq")
+"""The last two are for ranges of speed alone."""
 ON_BLOCK = {"shaking force": slice(0, 3), "rocking couple": slice(4, 6), "roll moment": slice(3, 4)}
 
 
 def norm_and_channel(quantity: str) -> tuple[str, str]:
     """Return the "peak to peak", "mount force" of "peak to peak mount force"; no norm where it has none."""
-    for norm in NORMS:
+    for norm in NORMS if quantity not in plain_motion.QUANTITIES else ():
         if quantity.startswith(f"{norm} "):
             return norm, quantity[len(norm) + 1 :]
     return "", quantity
@@ -73,39 +83,43 @@ def smallest_ball(signal: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     return 2.0 * float(np.linalg.norm(v - centre, axis=1).max()) * scale, np.array(support), pull
 
 
+POWERS = {"mean": 1, "rms": 2, "rmq": 4}
+
+
 def norm_of(norm: str, signal: np.ndarray, weights: np.ndarray) -> float:
     """Return the norm of a signal, shape (points, places, samples, d); points of weight zero do not count."""
     counted = signal[weights > 0.0]
     share = weights[weights > 0.0] / weights.sum()
+    if norm in ("peak to peak", "maximum") or norm.startswith("worst"):
+        return max(norm_at(norm, point) for point in counted)
+    power = POWERS[norm]
+    return float(share @ [norm_at(norm, point) ** power for point in counted]) ** (1.0 / power)
+
+
+def norm_at(norm: str, signal: np.ndarray) -> float:
+    """Return the norm at one operating point, shape (places, samples, d)."""
     if norm == "peak to peak":
-        return max(smallest_ball(v)[0] for point in counted for v in point)
-    length = np.linalg.norm(counted, axis=-1)
-    if norm == "mean":
-        return float(share @ length.mean(axis=(1, 2)))
-    if norm == "worst mean":
-        return float(length.mean(axis=(1, 2)).max())
-    if norm == "rms":
-        return math.sqrt(float(share @ (length**2).mean(axis=(1, 2))))
-    if norm == "rmq":
-        return float(share @ (length**4).mean(axis=(1, 2))) ** 0.25
-    return float(length.max())
+        return max(smallest_ball(v)[0] for v in signal)
+    length = np.linalg.norm(signal, axis=-1)
+    power = POWERS.get(norm.removeprefix("worst "))
+    return float(length.max()) if power is None else float((length**power).mean()) ** (1.0 / power)
 
 
 @lru_cache(maxsize=64)
-def _machine(engine: str, order: tuple[int, ...] | None) -> plain_loads.Machine:
+def machine_of(engine: str, order: tuple[int, ...] | None) -> plain_loads.Machine:
     return plain_loads.machine(json.loads(engine), list(order) if order else None)
 
 
 @lru_cache(maxsize=64)
 def _unit_load(engine: str, order: tuple[int, ...] | None) -> np.ndarray:
-    return plain_loads.engine_spectrum(_machine(engine, order))
+    return plain_loads.engine_spectrum(machine_of(engine, order))
 
 
 @lru_cache(maxsize=64)
 def _gas_load(
     engine: str, order: tuple[int, ...] | None, gas: str, unfired: tuple[tuple[int, str], ...] = ()
 ) -> np.ndarray:
-    return plain_loads.gas_spectrum(json.loads(gas), _machine(engine, order), dict(unfired))
+    return plain_loads.gas_spectrum(json.loads(gas), machine_of(engine, order), dict(unfired))
 
 
 def states_of(point: Table, cylinders: int) -> list[Table]:
@@ -140,7 +154,7 @@ class Scene:
 
     def __init__(self, table: Table, rotors: list[tuple[Any, ...]], order: tuple[int, ...] | None = None) -> None:
         self.table, self.rotors, self.order = table, rotors, order
-        self._key = json.dumps(plain_gear.weighed(table), sort_keys=True)
+        self.key = json.dumps(plain_gear.weighed(table), sort_keys=True)
 
     @cached_property
     def turns(self) -> int:
@@ -148,7 +162,7 @@ class Scene:
 
     @cached_property
     def points(self) -> list[Table]:
-        cylinders = len(_machine(self._key, self.order).mechanisms)
+        cylinders = len(machine_of(self.key, self.order).mechanisms)
         return [state for point in self.table["operating_points"] for state in states_of(point, cylinders)]
 
     @cached_property
@@ -169,16 +183,22 @@ class Scene:
     @cached_property
     def wrenches(self) -> list[np.ndarray]:
         """Return the coefficients (n, 6) of every operating point; gas is real and does not grow with speed."""
-        unit = _unit_load(self._key, self.order).copy()
-        for _, x, place, ratio, unbalance, *_ in self.rotors:
+        unit = _unit_load(self.key, self.order).copy()
+        for _, x, place, ratio, unbalance, _, role in self.rotors:
+            if role == plain_electric.ROLE:
+                continue
             unit += np.fft.rfft(plain_loads.rotor_load(x, place, ratio, unbalance, self.turns), axis=0) / SAMPLES
         signals = [unit * speed**2 for speed in self.speeds]
+        if "electric_machines" in self.table:
+            for signal, point in zip(signals, self.points, strict=True):
+                _, on_block = plain_electric.on_crank_and_block(self, point)
+                signal[:, 3] += np.fft.rfft(on_block) / SAMPLES
         if "gas" in self.table:
             for k, point in enumerate(self.points):
                 if point.get("gas", True):
                     keys = {**self.table["gas"], **({"imep": point["imep"]} if "imep" in point else {})}
                     gas = json.dumps(keys, sort_keys=True)
-                    signals[k] = signals[k] + _gas_load(self._key, self.order, gas, unfired_of(point))
+                    signals[k] = signals[k] + _gas_load(self.key, self.order, gas, unfired_of(point))
         return signals
 
     @cached_property
@@ -199,6 +219,9 @@ class Scene:
                 part = wrench[keep][:, None, ON_BLOCK[channel]]
             elif channel == "mount force":
                 part = self.mounting.forces(*state)
+            elif channel in plain_receivers.QUANTITIES:
+                assert isinstance(self.mounting, plain_mounts.Elastic), channel
+                part = plain_receivers.responses(self.table, self.mounting, channel, *state)
             else:
                 assert isinstance(self.mounting, plain_mounts.Elastic), channel
                 part = self.mounting.travel(*state)
@@ -209,16 +232,38 @@ class Scene:
 
     def signal(self, term: Table) -> np.ndarray:
         """Return an array (points, places, samples, d) of a load that is asked for."""
+        signal = self._signal(term)
+        if "over" in term:
+            counted = self.weights(term) > 0.0
+            signal[counted] /= np.array(term["over"])[:, None, None, None]
+        return signal
+
+    def values_at_points(self, term: Table) -> np.ndarray:
+        """Its value at every operating point that counts."""
+        norm, _ = norm_and_channel(term["quantity"])
+        return np.array([norm_at(norm, one) for one in self.signal(term)[self.weights(term) > 0.0]])
+
+    def _signal(self, term: Table) -> np.ndarray:
         _, channel = norm_and_channel(term["quantity"])
         if channel in plain_crankcase.CHANNELS:
-            return plain_crankcase.signal(self, _machine(self._key, self.order), channel, term.get("orders"))
+            return plain_crankcase.signal(self, machine_of(self.key, self.order), channel, term.get("orders"))
         if channel in plain_gear.SIZED:
-            machine = _machine(self._key, self.order)
+            machine = machine_of(self.key, self.order)
             return np.stack([plain_gear.stress(self, machine, channel, k) for k in range(len(self.points))])
+        if channel == "electric torque":
+            names = term.get("electric_machines", [one["name"] for one in self.table["electric_machines"]])
+            machines = [one for one in self.table["electric_machines"] if one["name"] in names]
+            rows = [[plain_electric.torque(self, one, point) for one in machines] for point in self.points]
+            return np.array(rows)[..., None]
         signals = [plain_mounts.over_cycle(c) for c in self.coefficients(channel, term.get("orders"))]
         signal = np.stack(signals).transpose(0, 2, 1, 3)
         if channel in ON_BLOCK:
             return signal * np.array(term.get("direction_weights", 1.0))
+        if channel in plain_receivers.QUANTITIES:
+            unit, _ = plain_receivers.QUANTITIES[channel]
+            names = [one["name"] for one in self.table["receivers"] if one.get("unit", "m/s^2") == unit]
+            places = [names.index(name) for name in term.get("receivers", names)]
+            return signal[:, places] * np.array(term.get("direction_weights", [1.0, 1.0, 1.0]))
         names = [place.get("name", f"mount {k + 1}") for k, place in enumerate(self.table["mounts"]["places"])]
         places = [names.index(name) for name in term.get("mounts", names)]
         return signal[:, places] * np.array(term.get("direction_weights", [1.0, 1.0, 1.0]))
@@ -234,16 +279,18 @@ class Scene:
         if norm:
             return norm_of(norm, self.signal(term), self.weights(term))
         if channel == "running-gear mass":
-            return plain_gear.mass(self.table, _machine(self._key, self.order))
+            return plain_gear.mass(self.table, machine_of(self.key, self.order))
         if channel == "throw clearance":
-            return plain_gear.clearance(self.table, _machine(self._key, self.order))
+            return plain_gear.clearance(self.table, machine_of(self.key, self.order))
         if channel.endswith("mass"):
             return self.mass(channel)
         if channel.startswith("apex"):
             at = np.array(self.speeds)[self.weights(term) > 0.0].max()
             return plain_rotary.apex(self.table["engine"], float(at), 1 + channel.endswith("acceleration"))
+        if channel in plain_motion.QUANTITIES:
+            return plain_motion.largest(self, machine_of(self.key, self.order), term, channel)
         if channel == "degree of irregularity":
-            return plain_crankcase.irregularity(self, _machine(self._key, self.order), self.weights(term))
+            return plain_crankcase.irregularity(self, machine_of(self.key, self.order), self.weights(term))
         block = self.mounting
         assert isinstance(block, plain_mounts.Elastic), channel
         if channel == "transmissibility":
@@ -267,7 +314,7 @@ class Scene:
 
     def mass(self, channel: str) -> float:
         role = {"counterweight mass": "c", "balancer mass": "b", "added mass": "cb"}[channel]
-        machines = _machine(self._key, self.order).mechanisms if "c" in role else []
+        machines = machine_of(self.key, self.order).mechanisms if "c" in role else []
         levers = sum(m.lever.weight for m in machines if m.lever is not None)
         return levers + sum(abs(u) / radius for *_, u, radius, kind in self.rotors if kind in role)
 
@@ -289,6 +336,8 @@ class Scene:
             return float(max(over, under, within))
         value = self.measure(term)
         over = value / number(limit["max"]) - 1.0 if "max" in limit else -1.0
+        if limit["limit"] in plain_motion.QUANTITIES and "min" in limit:
+            value = plain_motion.smallest(self, machine_of(self.key, self.order), term, limit["limit"])
         under = 1.0 - value / number(limit["min"]) if "min" in limit else -1.0
         return max(over, under)
 

@@ -24,12 +24,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from attack.claims import Verdict, tried, try_problem
 from attack.crossings import CROSSINGS, OWN_CROSSINGS
+from attack.driven_families import FAMILIES as DRIVEN_FAMILIES
 from attack.families import FAMILIES, problem, toml
+from attack.newer_families import FAMILIES as NEWER_FAMILIES
 from attack.own_families import OWN_FAMILIES
 from attack.page import lines_of, page
 from attack.plain_loads import SAMPLES
 from attack.plain_scene import Table
+from attack.ranged_families import FAMILIES as RANGED_FAMILIES
 from attack.single_families import FAMILIES as SINGLE_FAMILIES
+from attack.skipped_families import STUDIES
 from attack.variations import VARIATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,11 +46,27 @@ VARIED = {
 NAMES = [
     *FAMILIES,
     *SINGLE_FAMILIES,
+    *DRIVEN_FAMILIES,
+    *RANGED_FAMILIES,
+    *NEWER_FAMILIES,
     *OWN_FAMILIES,
     *CROSSINGS,
+    *STUDIES,
     *(f"{variation} of {family}" for variation, families in VARIED.items() for family in families),
 ]
-GROUPS = {"all": NAMES, "crossings": [*CROSSINGS], "alone": [*FAMILIES, *SINGLE_FAMILIES, *OWN_FAMILIES]}
+GROUPS = {
+    "all": NAMES,
+    "crossings": [*CROSSINGS],
+    "alone": [
+        *FAMILIES,
+        *SINGLE_FAMILIES,
+        *DRIVEN_FAMILIES,
+        *RANGED_FAMILIES,
+        *NEWER_FAMILIES,
+        *OWN_FAMILIES,
+        *STUDIES,
+    ],
+}
 """Families by one word."""
 FINER = 32768
 EFFORT = 6
@@ -71,6 +91,10 @@ def drawn(family: str, seed: int) -> tuple[Table, np.random.Generator]:
 def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
     """Attack one problem of a family, or a variation of one: "prices of inline"."""
     variation, _, family = name.rpartition(" of ")
+    if name in STUDIES:
+        rng = np.random.default_rng([*name.encode(), seed])
+        with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+            return tried(Verdict(name, seed), lambda: STUDIES[name](rng, Path(folder)))
     table, rng = drawn(family, seed)
     with tempfile.TemporaryDirectory(prefix="attack-") as folder:
         if variation:

@@ -28,6 +28,8 @@ SEEDS = {
     "uneven crankcase": (1101, 101001), "worst means": (0, 2), "root mean quads": (9, 11),
     "single cylinders": (101, 103), "single gas": (102, 122), "single stars": (101, 104),
     "single opposed pistons": (101,), "single radial cylinders": (101,),
+    "crank-rockers": (5, 4), "rhombic drives": (0, 2, 4), "speed ranges": (5, 0, 1), "electric machines": (4, 1),
+    "receivers": (4,), "piston motion": (4, 1), "skip fire": (4, 1, 3),
     "prices of elastic-balance": (1,), "prices of convex-mounts": (1,),
     "monotony of inline": (2,), "invariance of convex-mounts": (1,), "invariance of inline": (2,),
 }  # fmt: skip
@@ -43,6 +45,8 @@ MORE = {
     ("yokes", 4), ("chambers", 5), ("worst means", 2), ("root mean quads", 11), ("convex-mounts", 1),
     ("elastic-few", 1), ("inline", 1), ("open-vees", 130), ("gas", 4), ("convex-mounts", 0),
     ("prices of elastic-balance", 1),
+    ("crank-rockers", 4), ("rhombic drives", 2), ("rhombic drives", 4), ("speed ranges", 0), ("speed ranges", 1),
+    ("electric machines", 1), ("receivers", 4), ("piston motion", 1), ("skip fire", 1), ("skip fire", 3),
 }  # fmt: skip
 """Costly ones, of families that keep another, here or in the tests below."""
 DRAWN = [(family, seed) for family, seeds in SEEDS.items() for seed in seeds]

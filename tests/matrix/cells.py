@@ -127,6 +127,23 @@ def _yoke(rng: Generator) -> Document:
     return {**_line(rng), **drive, "lever": lever}
 
 
+def _crank_rocker(rng: Generator) -> Document:
+    side, reach = int(rng.choice([-1, 1])), float(rng.uniform(130, 150))
+    links = {"rocker_arm": "140 mm", "rocker_end": f"{reach:.4g} mm", "rocker_angle": 180, "rocker_side": side}
+    pivot = {"rocker_pivot_along": "-252 mm", "rocker_pivot_across": f"{140 * side} mm", "offset": f"{280 * side} mm"}
+    weighs = {"mass": "0.9 kg", "centre_of_gravity": f"{rng.integers(-30, 60)} mm", "inertia": "3e-3 kg m^2"}
+    rods = {"coupler_length": "252 mm", "piston_rod_length": "150 mm"}
+    return {**_line(rng), "drive": "crank-rocker", **pivot, **links, **rods, "rocker": weighs}
+
+
+def _rhombic(rng: Generator) -> Document:
+    """Both cranks of one drive."""
+    shafts = [{"name": "R", "ratio": -1, "position": ["110 mm", "0 mm"]}]
+    cranks = [{"x": "20 mm", "offset": "40 mm"}, {"x": "20 mm", "offset": "-40 mm", "shaft": "R", "throw": 0}]
+    keys = {"drive": "rhombic", "displacer_mass": f"{rng.uniform(0.3, 1.0):.4g} kg", "fires_together": True}
+    return {"layout": "parts", "cycle": "two-stroke", **keys, "shafts": shafts, "slider_cranks": cranks}
+
+
 def _steam(rng: Generator) -> Document:
     return {**_line(rng), "cycle": "two-stroke", "drive": str(rng.choice(["slider-crank", "klein", "scotch-yoke"]))}
 
@@ -153,7 +170,10 @@ LAYOUTS: Mapping[str, Callable[[Generator], Document]] = {
     "radial": _radial,
     "parts": _parts,
     "swinging yoke": _yoke,
+    "crank-rocker": _crank_rocker,
+    "rhombic": _rhombic,
     "steam": _steam,
+    "speed range": _line,
 }
 
 
@@ -273,6 +293,7 @@ DECISIONS: Mapping[str, LeaveOpen] = {
     "lever weight": _engine(
         lever_weight=Open("lever weight", 0.0, 2.0, "kg"), lever_weight_radius="60 mm", drive="swinging-yoke"
     ),
+    "displacer mass": _engine(displacer_mass=Open("displacer mass", 0.2, 1.4, "kg"), drive="rhombic"),
     "reciprocating mass": _engine(reciprocating_mass=Open("reciprocating mass", 0.3, 1.5, "kg")),
     "flywheel inertia": _wheel(inertia=Open("flywheel.inertia", 0.2, 3.0, "kg m^2")),
     "flywheel rim": _wheel(
@@ -328,7 +349,7 @@ def document_of(cell: Cell) -> Document:
         document["gas"] = {"model": "seiliger", "peak_pressure": "60 bar", "imep": "7 bar"}
     if cell.layout == "steam":
         document["gas"] = _chambers(rng)
-    if document["engine"].get("drive") in ("swinging-yoke", "scotch-yoke"):
+    if document["engine"].get("drive") in ("swinging-yoke", "scotch-yoke", "crank-rocker"):
         del document["engine"]["rod_ratio"]
     document["fidelity"] = {"samples": 120}
     document["search"] = {"starts": 2, "boxes": 100}
@@ -347,6 +368,8 @@ def document_of(cell: Cell) -> Document:
     document["objective"] = {"minimise": cell.measure, **_narrowed(cell.measure, document, rng)}
     if rng.random() < 0.4:
         _add_limit(document, rng)
+    if cell.layout == "speed range":
+        _add_range(document, rng)
     return document
 
 
@@ -384,6 +407,19 @@ def _add_mounts(document: Document, cell: Cell, rng: Generator) -> None:
         for place in places:
             place["relative_stiffness"] = [1.0, 1.0, 1.0]
     document["mounts.places"] = places
+
+
+def _add_range(document: Document, rng: Generator) -> None:
+    """Add a range, minimised or under a limit that is a curve."""
+    low = float(rng.uniform(700, 1500))
+    span = {"name": "range", "speeds": [f"{low:.5g} rpm", f"{low * rng.uniform(1.5, 4.0):.5g} rpm"]}
+    span["operating_point"] = document["operating_points"][0]["name"]
+    if rng.random() < 0.5:
+        document["objective"].pop("operating_points", None)
+        document["speed_ranges"] = [{**span, "minimise": True}]
+        return
+    most = [[f"{low:.5g} rpm", f"{rng.uniform(100, 3000):.5g} N"], ["4000 rpm", f"{rng.uniform(2000, 9000):.5g} N"]]
+    document["speed_ranges"] = [{**span, "quantity": "rms shaking force", "max": most}]
 
 
 def _narrowed(measure: str, document: Document, rng: Generator) -> Document:

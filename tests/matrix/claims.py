@@ -14,6 +14,8 @@ import numpy as np
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.speed_ranges.peaks import RangeResponses
+from laufruhe.extensions.speed_ranges.ranges import SpeedRanges, at_speeds
 from laufruhe.machine import Engine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -22,7 +24,7 @@ from laufruhe.prove.certificate import Proof, gap_of, gap_tolerance_of, relative
 from laufruhe.solvers import Result, Status
 from matrix.cells import Document, Open, OpenThrows, document_of, written
 
-TRIES, FINE = 24, 2880
+TRIES, FINE, SPEEDS = 24, 2880, 20
 # relative excess over a limit at which a design that is told counts as allowed, and one that is set against it
 ALLOWED, STRICTLY = 1e-5, 1e-9
 # share of a value by which another way of computing it may differ
@@ -68,10 +70,21 @@ def evaluate_design(cell: Any, folder: Path) -> Verdict:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            broken = tuple(_broken(document, problem, result, folder))
+            broken = tuple(_broken(document, _at_speeds(problem, result), result, folder))
         except (InputError, ModelError) as error:
             broken = (f"decided, and cannot be evaluated: {error}",)
     return Verdict(broken=broken, status=str(result.status), kind=kind)
+
+
+def _at_speeds(problem: Problem, result: Result) -> Problem:
+    """The problem with its ranges of speed at many speeds, the peaks of the design decided among them."""
+    extra = problem.extra(SpeedRanges)
+    if extra is None:
+        return problem
+    speeds = {span.name: set(np.geomspace(span.low, span.high, SPEEDS).tolist()) for span in extra.ranges}
+    for one in result.details.final if isinstance(result.details, RangeResponses) else ():
+        speeds[one.span.name] |= set(one.speeds[one.tops].tolist())
+    return at_speeds(problem, extra.ranges, {name: sorted(at) for name, at in speeds.items()})
 
 
 def _broken(document: Document, problem: Problem, result: Result, folder: Path) -> Iterator[str]:
@@ -141,7 +154,7 @@ def _own_claims(document: Document, problem: Problem, result: Result, folder: Pa
     fires = problem.phasing is None or problem.phasing.intervals.holds(problem.engine.firing_intervals)
     if fires and given.violation(problem.limits) <= ALLOWED and value > worth + gap_tolerance_of(value, SAME, nothing):
         yield f"worse than the design as given: {value:.9g} against {worth:.9g}"
-    again = _loaded(document, _values(result), _order(result), folder)
+    again = _at_speeds(_loaded(document, _values(result), _order(result), folder), result)
     found = evaluate(again, samples=result.final.samples)
     if abs(objective_value(again, found) - value) > gap_tolerance_of(value, 1e-5, nothing):
         yield f"its design is worth {objective_value(again, found):.9g}, and {value:.9g} is told"
@@ -242,7 +255,7 @@ def _of_star(
         count = len(result.initial.engine.cylinders)
         order = [1, *generator.sample(range(2, count + 1), count - 1)]
     try:
-        other = _loaded(document, values, order, folder)
+        other = _at_speeds(_loaded(document, values, order, folder), result)
     except (InputError, ModelError):
         return None
     phasing = result.problem.phasing
