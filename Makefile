@@ -11,7 +11,7 @@ LOWEST_STAMP := $(LOWEST)/.installed
 # Every library at work, in about a minute.
 SMOKE := tests/problem/test_units.py tests/files/test_reader.py tests/report/test_number_files.py tests/report/test_json_result.py \
 	tests/cli/test_commands.py tests/solvers/test_conic.py tests/solvers/test_optimality.py tests/solvers/test_nonlinear.py \
-	tests/mounts/test_mount_convex.py tests/phasing/test_known_cases.py tests/extensions/indicator_diagrams/test_indicator_picture.py tests/studies/test_studies.py \
+	tests/mounts/test_mount_convex.py tests/phasing/test_known_cases.py tests/extensions/chambers/test_indicator_picture.py tests/studies/test_studies.py \
 	tests/extensions/random_studies/test_draws.py
 
 .PHONY: help solve study test test-fast test-long test-lowest lanes attack matrix mutants faults benchmarks proofs speed pictures docs lint format clean distclean

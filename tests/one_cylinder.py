@@ -8,11 +8,12 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, SliderCrank, Steam
+from laufruhe.extensions.chambers.gas import Steam
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, SliderCrank
+from laufruhe.machine.gas.base import OneChamber
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import OneChamber, pressure_at
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.shaking_loads import rotor_loads
@@ -73,7 +74,7 @@ def cylinder_pressure(gas: OneChamber, part: SliderCrank, cycle: Cycle, samples:
     ModelError
         If the model cannot meet its indicated mean pressure, or a trace does not cover the cycle.
     """
-    return pressure_at(gas, part, cycle, cycle.angle * np.arange(samples) / samples)
+    return gas.pressure(part, cycle, cycle.angle * np.arange(samples) / samples)
 
 
 def inertia_coefficients(

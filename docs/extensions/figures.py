@@ -14,8 +14,8 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.machine import Cycle, Seiliger, SliderCrank, Wiebe
-from laufruhe.physics.cylinder_volume import swept_volume
-from laufruhe.physics.gas_cycle import OneChamber, pressure_at, pressure_breaks
+from laufruhe.machine.gas.base import OneChamber
+from laufruhe.machine.gas.charge import swept_volume
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.plots.style import BLUE, GREY, ORANGE, VERMILION
 from laufruhe.plots.words import FAINT, INK
@@ -236,9 +236,9 @@ def gas_cycle() -> str:
                     "crank angle from the firing dead centre [deg]", "torque of one cylinder [N m]"),
     ]  # fmt: skip
     for k, (name, (gas, colour)) in enumerate(gases.items()):
-        angles = _angles(pressure_breaks(gas, part, Cycle.FOUR_STROKE))
+        angles = _angles(gas.breaks(part, Cycle.FOUR_STROKE))
         volume = 1.0 / (gas.compression_ratio - 1.0) + swept_volume(part, angles)  # type: ignore[union-attr]
-        pressure = 1e-5 * pressure_at(gas, part, Cycle.FOUR_STROKE, angles)
+        pressure = 1e-5 * gas.pressure(part, Cycle.FOUR_STROKE, angles)
         torque = chamber_torque(gas, part, Cycle.FOUR_STROKE, angles)
         parts.append(path(left.at(volume, pressure), colour, 1.8))
         parts.append(path(right.at(np.degrees(angles), torque), colour, 1.8))

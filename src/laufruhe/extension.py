@@ -22,7 +22,7 @@ from laufruhe.errors import ModelError
 GROUP = "laufruhe.extensions"
 Tables = Literal[
     "norms", "channels", "kinds", "layouts", "drives", "methods", "quantities", "provers", "reductions", "study_kinds",
-    "commands", "keys", "weight_keys", "notes", "pictures", "sections", "advice", "diagnoses",
+    "commands", "keys", "weight_keys", "gas_models", "notes", "pictures", "sections", "advice", "diagnoses",
 ]  # fmt: skip
 
 
@@ -63,6 +63,8 @@ class Extension:
         Objects of `laufruhe.files.problem_file.Key`: tables of a problem file.
     weight_keys
         Objects of `laufruhe.files.problem_file.WeightKey`: keys of counterweights and of unbalances of shafts.
+    gas_models
+        Subclasses of `laufruhe.files.gas.GasTable`: models of [gas].
     notes
         Objects of `laufruhe.files.problem_file.Note`: notes that a file may add to any number, such as tolerances.
     sections
@@ -90,6 +92,7 @@ class Extension:
     commands: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()
     weight_keys: tuple[str, ...] = ()
+    gas_models: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     sections: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
@@ -153,6 +156,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "electric_machines": "electric_torque",
     },
     "weight_keys": {"body": "workshop"},
+    "gas_models": {"chambers": "chambers", "pressure_file": "recorded_pressure", "trace": "recorded_pressure"},
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "reductions": {"objectives in order": "objectives_in_order"},
     "norms": {"rmq": "root_mean_quad", "worst mean": "worst_mean"},
@@ -171,6 +175,11 @@ INSTALL = "install laufruhe with all its folders"
 def missing_extension(extension: str) -> tuple[str, str]:
     """Return rule and remedy for a file that needs an extension of this package that is not installed."""
     return f"needs the extension '{extension}', which is not installed", INSTALL
+
+
+def is_installed(extension: str) -> bool:
+    """Return True if an extension is installed, by its name."""
+    return any(one.name == extension for one in extensions())
 
 
 def object_at(address: str) -> Any:

@@ -7,17 +7,21 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 import laufruhe
 from extensions.removed_folder import SOURCE, without
 from lanes import first_fast
 from laufruhe import extension
 from laufruhe.extension import HOMES, Tables
+from laufruhe.files import complaints
+from laufruhe.files.problem_file import ProblemFile
 from laufruhe.prove.mounts.provers import PROVERS, Prover
 from laufruhe.solvers import methods
 from laufruhe.solvers.method import Method
@@ -56,6 +60,7 @@ def words_of(table: Tables, name: str, folder: Path) -> list[str]:
         "keys": ("solve", f"{text}\n[{name}]\n"),
         "weight_keys": ("solve", f'{text}\n[[counterweights]]\nname = "w"\n{name} = {{}}\n'),
         "reductions": ("solve", text.replace("[objective]", '[[objective]]\nminimise = "added mass"\n[[objective]]')),
+        "gas_models": ("solve", text.replace('model = "seiliger"', f'model = "{name}"')),
         "norms": ("solve", re.sub(r"minimise = .*", f'minimise = "{name} mount force"', text)),
         "channels": ("solve", re.sub(r"minimise = .*", f'minimise = "{name}"', text)),
         "notes": ("solve", re.sub(r"reciprocating_mass = .*", f"reciprocating_mass = {mass}", text)),
@@ -124,6 +129,19 @@ def test_other_additions_keep_their_order_without_an_extension(name: str, monkey
     monkeypatch.setattr(extension, "extensions", lambda: others)
     for table, kind, core in ORDERED:
         assert len(extension.in_order(table, kind, core)) >= len(core)
+
+
+@pytest.mark.parametrize(("table", "key"), [("gas", "chambers"), ("operating_points", "pressure_file")])
+def test_a_key_inside_a_table_names_its_extension(table: str, key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(complaints, "is_installed", lambda _: False)
+    tables = tomllib.loads((PROBLEMS / "compressor-set.toml").read_text(encoding="utf-8"))
+    changed = tables[table][0] if isinstance(tables[table], list) else tables[table]
+    changed[key] = []
+    with pytest.raises(ValidationError) as error:
+        # the model of files without the keys of extensions
+        ProblemFile.model_validate(tables)
+    (complaint,) = complaints.complaints_of(error.value, ProblemFile)
+    assert complaint.rule == f"needs the extension '{HOMES['gas_models'][key]}', which is not installed"
 
 
 REMOVED = [EXTENSIONS, *([name] for name in EXTENSIONS)]

@@ -14,10 +14,10 @@ import pytest
 import laufruhe
 from fidelity.scenes import random_problem
 from lanes import first_fast
-from laufruhe.machine import GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
+from laufruhe.machine import GasModel, Seiliger, SliderCrank, Wiebe
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.bearing_loads import pin_forces
-from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem import channels
@@ -77,7 +77,7 @@ def _signal(problem: Problem, measure: Measure, k: int, count: int) -> np.ndarra
 def _torque(gas: GasModel | None, part: SliderCrank, angles: Any, cycle: Any) -> Any:
     assert gas is not None
     alpha = part.fires_at + part.shaft.ratio * angles
-    pressure = pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure
+    pressure = gas.pressure(part, cycle, angles) - gas.crankcase_pressure
     return -part.shaft.ratio * part.piston_area * pressure * part.velocity(np, alpha)
 
 
@@ -95,7 +95,7 @@ def _bends(gas: GasModel | None, part: SliderCrank, whole: float) -> Any:
         cycle = next(c for c in laufruhe.machine.Cycle if c.angle == whole)
         for _ in range(60):
             middle = 0.5 * (low + high)
-            held = pressure_at(gas, part, cycle, np.array([middle]))[0] >= gas.peak_pressure * (1.0 - 1e-13)
+            held = gas.pressure(part, cycle, np.array([middle]))[0] >= gas.peak_pressure * (1.0 - 1e-13)
             low, high = (middle, high) if held else (low, middle)
         found.append(np.array([low]))
     return np.concatenate(found)
@@ -198,7 +198,7 @@ def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
         silent = pin_forces(engine, replace(point, gas=None)).with_finer_base(cycle.base_order)
         whole = silent.values(angles + part.firing_angle)[:, k]
         assert point.gas is not None
-        push = part.piston_area * (pressure_at(point.gas, part, cycle, angles) - point.gas.crankcase_pressure)
+        push = part.piston_area * (point.gas.pressure(part, cycle, angles) - point.gas.crankcase_pressure)
         alpha = part.fires_at + part.shaft.ratio * angles
         tangent = part.rod_ratio * np.sin(alpha) - part.offset_ratio
         tangent = tangent / np.sqrt(1.0 - tangent**2)

@@ -10,9 +10,10 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.files.reader import load, load_tables, tables_of
-from laufruhe.machine import Cycle, PressureTrace, Seiliger
-from laufruhe.machine.chambers import CylinderGases
+from laufruhe.machine import Cycle, Seiliger
+from laufruhe.machine.gas.base import CylinderGases
 from laufruhe.problem.evaluation import evaluate
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, open_unbalance, shaft, written
 
@@ -253,7 +254,7 @@ BAD = [
     bad("unknown gas model", '"seiliger"', '"seliger"',
         """gas.model = "seliger": is not allowed; did you mean 'seiliger'?"""),
     bad("no gas model", "model = \"seiliger\"\n", "",
-        "gas.model: is missing; use one of: seiliger, wiebe, trace"),
+        "gas.model: is missing; use one of: seiliger, wiebe, chambers, trace"),
     bad("a vee's throws", '"inline"', '"vee"',
         "engine.throws: gives 8 cylinders, but engine.firing_order gives 4"),
     bad("key of another layout", '"inline"', "\"inline\"\nbank_angle = 90",

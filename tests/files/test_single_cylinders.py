@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.machine.chambers import Chambers, CylinderGases
+from laufruhe.extensions.chambers.gas import Chambers
+from laufruhe.machine.gas.base import CylinderGases
 from laufruhe.physics.shaking_loads import shaking_loads
 
 ENGINE: dict[str, Any] = {

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.files.reader import load
-from laufruhe.machine import Cycle, Engine, OperatingPoint, PressureTrace, Rod, SliderCrank
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Rod, SliderCrank
 from laufruhe.machine import kinematics as slider_crank
-from laufruhe.machine.gas import AMBIENT_PRESSURE
+from laufruhe.machine.gas.base import AMBIENT_PRESSURE
 from laufruhe.machine.layouts import build, even_throws, inline
 from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.fidelity import EXACT, Fidelity

@@ -12,11 +12,9 @@ import pytest
 import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.machine import Cycle, Seiliger, SliderCrank
-from laufruhe.machine.chambers import CylinderGases
+from laufruhe.machine.gas.base import CylinderGases
 from laufruhe.physics.bearing_loads import pin_forces
-from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.gas_loads import gas_coefficients
-from laufruhe.physics.seiliger_cycle import trapped_charge
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque, cylinder_torque, torque_facts, turning_torque
 
@@ -96,7 +94,7 @@ def test_a_recorded_cylinder_without_combustion_is_that_of_misfire(tmp_path: Pat
               {"name": "motored", "speed": "900 rpm", "motored": True})  # fmt: skip
     computed = laufruhe.load(engine_tables(*points))
     degrees, part = np.arange(-360.0, 360.0, 1.0), computed.engine.slider_cranks[0]
-    columns = [pressure_at(computed.points[k].gas, part, Cycle.FOUR_STROKE, np.radians(degrees)) for k in (0, 2)]
+    columns = [computed.points[k].gas.pressure(part, Cycle.FOUR_STROKE, np.radians(degrees)) for k in (0, 2)]
     rows = (f"{a},{p / 1e5:.9f},{q / 1e5:.9f}" for a, p, q in zip(degrees, *columns, strict=True))
     (tmp_path / "both.csv").write_text("angle,fired,motored\n" + "\n".join(rows) + "\n")
     gas = {"model": "trace", "file": str(tmp_path / "both.csv"), "pressure_column": "fired", "smooth": False}
@@ -112,12 +110,10 @@ def test_a_recorded_cylinder_without_combustion_is_that_of_misfire(tmp_path: Pat
 
 def test_closed_valves_do_no_work_and_repeat_every_turn() -> None:
     part = SliderCrank("cylinder 1", 0.0, RADIUS, ROD, 0.5, bore=BORE)
-    gas = trapped_charge(
-        Seiliger(peak_pressure=PEAK, imep=IMEP, compression_ratio=RATIO, intake_pressure=INTAKE), False
-    )
+    gas = Seiliger(peak_pressure=PEAK, imep=IMEP, compression_ratio=RATIO, intake_pressure=INTAKE).cut(False)
     angle = np.linspace(0.0, math.tau, 101)
-    pressure = pressure_at(gas, part, Cycle.FOUR_STROKE, angle)
-    np.testing.assert_allclose(pressure, pressure_at(gas, part, Cycle.FOUR_STROKE, angle + math.tau), rtol=1e-12)
+    pressure = gas.pressure(part, Cycle.FOUR_STROKE, angle)
+    np.testing.assert_allclose(pressure, gas.pressure(part, Cycle.FOUR_STROKE, angle + math.tau), rtol=1e-12)
     np.testing.assert_allclose([pressure.max(), pressure.min()], [INTAKE * RATIO**N1, INTAKE], rtol=1e-12)
     problem = laufruhe.load(engine_tables({"name": "p", "speed": "900 rpm", "cut": [1, 2, 3, 4]}))
     assert abs(crank_torque(problem.engine, problem.points[0]).coefficients[0]) < 1e-9

@@ -14,18 +14,16 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, PressureTrace, Seiliger, Shaft, SliderCrank, Wiebe
-from laufruhe.physics.cylinder_volume import dead_centres, swept_volume
-from laufruhe.physics.gas_loads import _one_cylinder, gas_coefficients
-from laufruhe.physics.pressure_trace import trace_pressure
-from laufruhe.physics.seiliger_cycle import (
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
+from laufruhe.machine import Cycle, Seiliger, Shaft, SliderCrank, Wiebe
+from laufruhe.machine.gas.charge import dead_centres, swept_volume
+from laufruhe.machine.gas.seiliger import (
     compression_end_pressure,
-    motored_cycle,
     seiliger_cut_off,
     seiliger_imep,
-    seiliger_pressure,
 )
-from laufruhe.physics.wiebe_cycle import wiebe_heat, wiebe_pressure
+from laufruhe.machine.gas.wiebe import wiebe_heat
+from laufruhe.physics.gas_loads import _one_cylinder, gas_coefficients
 from one_cylinder import cylinder_pressure, indicated_mean_pressure, swept_rate
 
 BAR, AT = 1e5, 98_066.5
@@ -178,7 +176,7 @@ class TestSeiliger:
     @every_cycle
     def test_peak_and_its_place(self, part: SliderCrank, cycle: Cycle) -> None:
         angles = np.linspace(0.0, cycle.angle, 7200, endpoint=False) + 1e-4
-        pressures = seiliger_pressure(DIESEL, part, cycle, angles)
+        pressures = DIESEL.cycle_pressure(part, cycle, angles, 1.0)
         assert pressures.max() == DIESEL.peak_pressure
         clearance = 1.0 / (DIESEL.compression_ratio - 1.0)
         at_peak = angles[pressures == DIESEL.peak_pressure]
@@ -190,7 +188,7 @@ class TestSeiliger:
         gas = replace(DIESEL, intake_pressure=1.5 * BAR, exhaust_pressure=1.2 * BAR)
         part, clearance = PARTS["offset"], 1.0 / 16.0
         angles = np.radians([100.0, 200.0, 350.0, 380.0, 520.0, 600.0])
-        result = seiliger_pressure(gas, part, Cycle.FOUR_STROKE, angles)
+        result = gas.cycle_pressure(part, Cycle.FOUR_STROKE, angles, 1.0)
         expansion, compression = clearance + _volume(part, angles[[0, 5]])
         knee = clearance * seiliger_cut_off(gas, Cycle.FOUR_STROKE)
         assert result[0] == pytest.approx(gas.peak_pressure * (knee / expansion) ** 1.30, rel=1e-12)
@@ -199,7 +197,7 @@ class TestSeiliger:
 
     def test_two_stroke_cycle_has_no_gas_exchange_strokes(self) -> None:
         part = PARTS["plain"]
-        result = seiliger_pressure(DIESEL, part, Cycle.TWO_STROKE, np.radians([179.0, 181.0, 300.0]))
+        result = DIESEL.cycle_pressure(part, Cycle.TWO_STROKE, np.radians([179.0, 181.0, 300.0]), 1.0)
         assert result[0] > 2 * BAR
         assert result[1] == pytest.approx(DIESEL.intake_pressure, rel=1e-3)
         assert result[2] > 1.5 * DIESEL.intake_pressure
@@ -227,14 +225,14 @@ class TestSeiliger:
         pressures = cylinder_pressure(gas, PARTS["plain"], cycle, 720)
         assert abs(indicated_mean_pressure(pressures, PARTS["plain"], cycle)) < 1e-9 * BAR
         angles = np.radians([3.0, 40.0, 120.0])
-        left = seiliger_pressure(gas, PARTS["plain"], cycle, cycle.angle - angles)
-        np.testing.assert_allclose(seiliger_pressure(gas, PARTS["plain"], cycle, angles), left, rtol=1e-7)
+        left = gas.cycle_pressure(PARTS["plain"], cycle, cycle.angle - angles, 1.0)
+        np.testing.assert_allclose(gas.cycle_pressure(PARTS["plain"], cycle, angles, 1.0), left, rtol=1e-7)
 
     @every_cycle
     def test_full_cut_off_keeps_the_peak_down_the_whole_stroke(self, cycle: Cycle) -> None:
         gas = replace(DIESEL, imep=seiliger_imep(DIESEL, cycle, 17.0))
         assert seiliger_cut_off(gas, cycle) == 17.0
-        result = seiliger_pressure(gas, PARTS["plain"], cycle, np.linspace(0.01, 3.14, 50))
+        result = gas.cycle_pressure(PARTS["plain"], cycle, np.linspace(0.01, 3.14, 50), 1.0)
         assert (result == gas.peak_pressure).all()
 
 
@@ -244,7 +242,7 @@ class TestJumps:
         result = cylinder_pressure(gas, PARTS["plain"], Cycle.FOUR_STROKE, 720)
         assert result[0] == pytest.approx(0.5 * (compression_end_pressure(gas) + gas.peak_pressure), rel=1e-12)
         assert result[360] == pytest.approx(0.5 * (gas.exhaust_pressure + gas.intake_pressure), rel=1e-12)
-        before = seiliger_pressure(gas, PARTS["plain"], Cycle.FOUR_STROKE, np.array([math.pi - 1e-6]))
+        before = gas.cycle_pressure(PARTS["plain"], Cycle.FOUR_STROKE, np.array([math.pi - 1e-6]), 1.0)
         assert result[180] == pytest.approx(0.5 * (before[0] + gas.exhaust_pressure), rel=1e-6)
         assert before[0] > 2 * BAR
 
@@ -312,7 +310,7 @@ class TestWiebe:
     def test_against_integration(self, gas: Wiebe, part: SliderCrank) -> None:
         angles = np.linspace(-2.8, 2.8, 117)
         expected = _integrated(gas, part, wiebe_heat(gas, part, Cycle.TWO_STROKE), angles)
-        result = wiebe_pressure(gas, part, Cycle.TWO_STROKE, angles)
+        result = gas.cycle_pressure(part, Cycle.TWO_STROKE, angles, 1.0)
         np.testing.assert_allclose(result, expected, rtol=1e-9)
 
     @every_part
@@ -361,7 +359,7 @@ class TestWiebe:
         heat = wiebe_heat(gas, PARTS["plain"], Cycle.TWO_STROKE)
         assert heat == pytest.approx(8 * BAR / (1 - 17.0**-0.35), rel=1e-7)
         end = gas.intake_pressure * 17.0**1.35
-        result = wiebe_pressure(gas, PARTS["plain"], Cycle.TWO_STROKE, np.array([2e-4]))
+        result = gas.cycle_pressure(PARTS["plain"], Cycle.TWO_STROKE, np.array([2e-4]), 1.0)
         assert result[0] == pytest.approx(end + 0.35 * heat * 16.0, rel=1e-5)
 
     @every_part
@@ -375,11 +373,11 @@ class TestWiebe:
         assert result == pytest.approx(exchange, rel=2e-4, abs=1e-9 * BAR)
         angles = np.linspace(-2.8, 2.8, 41)
         adiabatic = gas.intake_pressure * (17.0 / (1.0 + 16.0 * _volume(part, angles))) ** 1.35
-        np.testing.assert_allclose(wiebe_pressure(gas, part, cycle, angles), adiabatic, rtol=1e-8)
+        np.testing.assert_allclose(gas.cycle_pressure(part, cycle, angles, 1.0), adiabatic, rtol=1e-8)
         whole = cycle.angle * np.arange(720) / 720
-        cold = seiliger_pressure(motored_cycle(BURN, cycle), part, cycle, whole)
+        cold = BURN.motored(cycle).cycle_pressure(part, cycle, whole, 1.0)
         gas = replace(gas, exhaust_pressure=BURN.exhaust_pressure, imep=0.0)
-        np.testing.assert_allclose(cold, wiebe_pressure(gas, part, cycle, whole), rtol=1e-8)
+        np.testing.assert_allclose(cold, gas.cycle_pressure(part, cycle, whole, 1.0), rtol=1e-8)
 
 
 class TestTrace:
@@ -388,7 +386,7 @@ class TestTrace:
     @pytest.mark.parametrize("first", [0.0, -1.3])
     def test_fine_trace_gives_back_what_it_was_taken_from(self, part: SliderCrank, cycle: Cycle, first: float) -> None:
         angles = first + np.linspace(0.0, cycle.angle, 3600 * cycle.turns, endpoint=False)
-        trace = PressureTrace(tuple(angles), tuple(seiliger_pressure(DIESEL, part, cycle, angles)))
+        trace = PressureTrace(tuple(angles), tuple(DIESEL.cycle_pressure(part, cycle, angles, 1.0)))
         expected, found = (cylinder_pressure(gas, part, cycle, 1440) for gas in (DIESEL, trace))
         away = np.ones(1440, dtype=bool)
         for centre in dead_centres(part):
@@ -405,9 +403,9 @@ class TestTrace:
         np.testing.assert_allclose(
             cylinder_pressure(trace, PARTS["plain"], Cycle.FOUR_STROKE, 72), pressures, rtol=1e-14
         )
-        seam = trace_pressure(trace, Cycle.FOUR_STROKE, 4 * math.pi + np.array([-1e-7, 0.0, 1e-7]))
+        seam = trace.cycle_pressure(PARTS["plain"], Cycle.FOUR_STROKE, 4 * math.pi + np.array([-1e-7, 0.0, 1e-7]), 1.0)
         np.testing.assert_allclose(seam, seam[1], rtol=1e-6)
-        fine = trace_pressure(trace, Cycle.FOUR_STROKE, np.radians(np.arange(0.0, 720.0)))
+        fine = trace.cycle_pressure(PARTS["plain"], Cycle.FOUR_STROKE, np.radians(np.arange(0.0, 720.0)), 1.0)
         exact = 2 * BAR + BAR * np.cos(0.5 * np.radians(np.arange(0.0, 720.0)))
         assert np.abs(fine - exact).max() < 5e-3 * BAR
 
@@ -415,9 +413,11 @@ class TestTrace:
         angles = np.radians(np.arange(0.0, 720.0, 5.0))
         pressures = 3 * BAR + BAR * np.cos(angles) + BAR * np.sin(0.5 * angles)
         at = np.linspace(0.0, 4 * math.pi, 333)
-        whole = trace_pressure(PressureTrace(tuple(angles), tuple(pressures)), Cycle.FOUR_STROKE, at)
+        whole = PressureTrace(tuple(angles), tuple(pressures)).cycle_pressure(
+            PARTS["plain"], Cycle.FOUR_STROKE, at, 1.0
+        )
         turned = PressureTrace((*(angles[72:] - 4 * math.pi), *angles[:72]), (*pressures[72:], *pressures[:72]))
-        np.testing.assert_allclose(trace_pressure(turned, Cycle.FOUR_STROKE, at), whole, rtol=1e-12)
+        np.testing.assert_allclose(turned.cycle_pressure(PARTS["plain"], Cycle.FOUR_STROKE, at, 1.0), whole, rtol=1e-12)
 
     def test_repeated_end_is_merged(self) -> None:
         angles = np.radians(np.arange(-360.0, 361.0, 5.0))
@@ -426,10 +426,12 @@ class TestTrace:
         open_end = PressureTrace(tuple(angles[:-1]), tuple(pressures[:-1]))
         closed = PressureTrace(tuple(angles), tuple(pressures))
         np.testing.assert_allclose(
-            trace_pressure(closed, Cycle.FOUR_STROKE, at), trace_pressure(open_end, Cycle.FOUR_STROKE, at), rtol=1e-12
+            closed.cycle_pressure(PARTS["plain"], Cycle.FOUR_STROKE, at, 1.0),
+            open_end.cycle_pressure(PARTS["plain"], Cycle.FOUR_STROKE, at, 1.0),
+            rtol=1e-12,
         )
         apart = PressureTrace(tuple(angles), (*pressures[:-1], pressures[-1] + BAR))
-        seam = trace_pressure(apart, Cycle.FOUR_STROKE, angles[:1])
+        seam = apart.cycle_pressure(PARTS["plain"], Cycle.FOUR_STROKE, angles[:1], 1.0)
         assert seam[0] == pytest.approx(pressures[0] + 0.5 * BAR)
 
     def test_a_jump_does_not_ring(self) -> None:
@@ -449,7 +451,9 @@ class TestTrace:
         angles = np.cumsum(gaps) * math.tau / gaps.sum() - 2.0
         pressures = random.uniform(1.0, 100.0, points) * BAR
         at = np.linspace(-3.0, 6.0, 801)
-        result = trace_pressure(PressureTrace(tuple(angles), tuple(pressures)), Cycle.TWO_STROKE, at)
+        result = PressureTrace(tuple(angles), tuple(pressures)).cycle_pressure(
+            PARTS["plain"], Cycle.TWO_STROKE, at, 1.0
+        )
         left = np.searchsorted(angles, angles[0] + np.mod(at - angles[0], math.tau), side="right") - 1
         ends = np.stack([pressures[left], pressures[(left + 1) % points]])
         assert (result >= ends.min(axis=0) * (1 - 1e-9)).all()

@@ -19,18 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from laufruhe.machine import (
-    CRANKSHAFT,
-    Cycle,
-    Engine,
-    OperatingPoint,
-    PressureTrace,
-    Rod,
-    Rotor,
-    Seiliger,
-    Shaft,
-    SliderCrank,
-)
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
+from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, Rod, Rotor, Seiliger, Shaft, SliderCrank
 from laufruhe.numerics.exact_angles import as_turn, cis
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.gas_loads import gas_loads

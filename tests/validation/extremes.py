@@ -15,7 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 import tractor
-from laufruhe.machine import Block, Cycle, Engine, Mount, OperatingPoint, PressureTrace
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
+from laufruhe.machine import Block, Cycle, Engine, Mount, OperatingPoint
 from laufruhe.machine.layouts import boxer, build, inline, vee
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum

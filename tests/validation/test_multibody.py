@@ -20,7 +20,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, PressureTrace, Rod, Role, Rotor, Shaft, SliderCrank
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
+from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.rotor import CRANKSHAFT
 from laufruhe.physics.bearing_loads import main_bearing_forces
 from laufruhe.physics.shaking_loads import shaking_loads

@@ -28,7 +28,6 @@ from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.machine.scaling import scale_part
 from laufruhe.physics.bearing_loads import crank_forces, main_bearing_forces, pin_forces, piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.shaking_loads import (
     reciprocating_loads,
     shaking_loads,
@@ -217,7 +216,7 @@ def test_gas_reaches_pins_and_walls_through_the_master_rod(five: Problem) -> Non
             pressed = {}
             for k, part in enumerate(engine.slider_cranks):
                 since = (phi - part.firing_angle) % (4.0 * math.pi)
-                pressed[k] = float(-thrust_at(gas, part, engine.cycle, np.array([since]))[0])
+                pressed[k] = float(-gas.thrust(part, engine.cycle, np.array([since]))[0])
             _, _, on_pins, on_walls = star.solved(phi, pressed, massless=True)
             size, at = max(abs(pin) for pin in on_pins), np.array([phi])
             result = pins.values(at)[0]

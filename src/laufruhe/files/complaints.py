@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
-from laufruhe.extension import HOMES, INSTALL, Tables, missing_extension
+from laufruhe.extension import HOMES, INSTALL, Tables, is_installed, missing_extension
 from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.nested import least_length
 from laufruhe.files.toml_text import toml_key, toml_value
@@ -30,10 +30,16 @@ MAX_COMPLAINTS = 20
 MISSING = "is missing"
 """Beginning of the rule about a key that is missing."""
 _CLOSE = 0.6
-_WEIGHTS = ("counterweights", "balancer_shafts")
+_NESTED: Mapping[str | int, Tables] = {
+    "counterweights": "weight_keys", "balancer_shafts": "weight_keys",
+    "gas": "gas_models", "operating_points": "gas_models",
+}  # fmt: skip
+"""Kinds of extension objects by the tables of a file in which these add keys."""
 _MAX_NAMED = 3
 _UNIT_SUFFIX = re.compile(r"_(mm|cm|m|kg|g|rpm|bar|deg|Nm|N)$")
-_TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
+_TABLES: Mapping[str, Tables] = {
+    "kind": "study_kinds", "layout": "layouts", "drive": "drives", "model": "gas_models",
+}  # fmt: skip
 """Kinds of extension objects by the keys of a file that name such an object."""
 _COUNTED = {
     "too_short": ("at least", "min_length", "add what is missing"),
@@ -160,10 +166,10 @@ def nearest_file(path: Path, otherwise: str) -> str:
 def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: type[BaseModel]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden":
-        of_table: Mapping[str, str] = HOMES["weight_keys"] if loc[0] in _WEIGHTS else {}
-        extension_homes = HOMES["keys"] if len(loc) == 1 else of_table
-        if str(loc[-1]) in extension_homes:
-            return Complaint(where, "", *missing_extension(extension_homes[str(loc[-1])]))
+        kind_of_key = "keys" if len(loc) == 1 else _NESTED.get(loc[0])
+        home = HOMES[kind_of_key].get(str(loc[-1])) if kind_of_key else None
+        if home and not is_installed(home):
+            return Complaint(where, "", *missing_extension(home))
         fields = {field.alias or name: field for table in tables[:1] for name, field in table.model_fields.items()}
         keys_of_tables = {key for key, field in fields.items() if _tables_in(field.annotation)}
         remedy = _key_remedy(str(loc[-1]), [*fields], keys_of_tables, model)

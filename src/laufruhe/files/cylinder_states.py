@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
 from laufruhe.files.fields import Table
 from laufruhe.files.gas import names_of_cylinders
-from laufruhe.machine import Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
-from laufruhe.machine.chambers import CommonGas, CylinderGases
-from laufruhe.physics.seiliger_cycle import motored_gas, trapped_charge
+from laufruhe.machine import Cycle, GasModel, SliderCrank
+from laufruhe.machine.gas.base import CylinderGases
 
 SINGLY = "each"
 
@@ -53,24 +52,22 @@ class CylinderState:
         """Return the gas of the engine in this state, from the gas with combustion in every cylinder."""
         if not self.misfire and not self.cut:
             return gas
-        gases = gas if isinstance(gas, CylinderGases) else gas and CylinderGases(gas, ())
+        gases = gas if isinstance(gas, CylinderGases) or gas is None else CylinderGases(gas, ())
 
-        def without_combustion(name: str, key: str) -> CommonGas:
+        def without_combustion(name: str, key: str) -> GasModel:
             model = gases and gases.of_cylinder(name)
-            if key == "cut" and isinstance(model, Seiliger | Wiebe):
-                return trapped_charge(model, self.has_open_valves)
-            motored = model and key == "misfire" and motored_gas(model, cycle)
-            if motored:
-                return motored
+            unfired = model and (model.cut(self.has_open_valves) if key == "cut" else model.motored(cycle))
+            if unfired:
+                return unfired
             rule = "needs [gas] with model seiliger or wiebe, which gives the pressure without combustion"
             remedy = "give [gas] such a model, or remove this key"
-            if key == "misfire" and isinstance(model, PressureTrace):
-                remedy = "record it too and name its motored_column of [gas], or remove this key"
+            if key == "misfire" and model and model.motored_remedy:
+                remedy = f"{model.motored_remedy}, or remove this key"
             raise Refused(f"{where}.{key}", name, rule, remedy)
 
         unfired = {name: without_combustion(name, "misfire") for name in self.misfire}
         unfired |= {name: without_combustion(name, "cut") for name in self.cut}
-        return gases and replace(gases, single=tuple((dict(gases.single) | unfired).items()))
+        return gases and CylinderGases(gases.common, tuple((dict(gases.single) | unfired).items()))
 
 
 def cylinder_states(

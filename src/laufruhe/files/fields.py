@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from laufruhe import units
 from laufruhe.errors import refused
-from laufruhe.extension import HOMES, extensions, missing_extension
+from laufruhe.extension import HOMES, is_installed, missing_extension
 from laufruhe.machine.crank_names import CRANKS
 from laufruhe.problem.decision import Decision, Drive
 from laufruhe.problem.sets import Interval
@@ -200,7 +200,7 @@ class Number:
 def _without_note(text: str) -> str:
     # the text may have a note of an extension that is not installed; other texts give no complaint
     home = next((home for mark, home in HOMES["notes"].items() if mark in text), "")
-    return "" if not home or any(one.name == home for one in extensions()) else "; ".join(missing_extension(home))
+    return "" if not home or is_installed(home) else "; ".join(missing_extension(home))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import errors_at_key
-from laufruhe.files.recorded_trace import Column, OverAngleTable, Quantity, RecordedFile, smooth_values
+from laufruhe.files.recorded_file import Column, OverAngleTable, Quantity, RecordedFile, smooth_values
 from laufruhe.machine import Cycle, LoadTorque, SliderCrank
 
 TORQUE = Quantity("torque", "N m", "N m", 1.0, "torque of the load")

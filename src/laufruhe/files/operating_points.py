@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
@@ -17,28 +16,17 @@ from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, 
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.cylinder_states import StateTable, cylinder_states
 from laufruhe.files.fields import Name, Table
-from laufruhe.files.gas import GasTable, RecordedGasTable, SeiligerTable, WiebeTable
-from laufruhe.machine import Chambers, Cycle, GasModel, OperatingPoint, PressureTrace, Seiliger, SliderCrank, Wiebe
-from laufruhe.machine.chambers import CommonGas, CylinderGases, models_of
-from laufruhe.machine.gas import AMBIENT_PRESSURE
+from laufruhe.files.gas import ChargeTable, GasTable
+from laufruhe.machine import Cycle, GasModel, OperatingPoint, SliderCrank
+from laufruhe.machine.gas.base import AMBIENT_PRESSURE
 from laufruhe.machine.slider_crank import displacement
 from laufruhe.physics.gas_loads import gas_coefficients
-from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
 MAX_POINTS = 200
 """Largest number of operating points; each takes 14 MB and 0.2 s on four mounts."""
 SAME_SPEED = 0.01
 """Relative difference of speeds within which rows of a fuel table belong together."""
-
-
-RecordedFileTable: TypeAlias = Annotated[
-    RecordedGasTable,
-    BeforeValidator(
-        lambda raw: {"file": raw} if isinstance(raw, str) else raw, json_schema_input_type=str | RecordedGasTable
-    ),
-]
-"""Recorded pressures by the name of their file, or with keys of their own."""
 
 
 class OperatingPointTable(StateTable):
@@ -54,10 +42,6 @@ class OperatingPointTable(StateTable):
     intake_pressure: f.PositivePressure | None = f.optional(
         "Absolute pressure in the manifold at this point, in place of that of [gas]; 0.3 to 0.5 bar in a throttled "
         "engine at idle."
-    )
-    pressure_file: RecordedFileTable | None = f.optional(
-        "File of the pressure recorded at this point, read as that of [gas] with model trace; or a table with the file "
-        "and with keys in place of those of [gas], such as angle_zero."
     )
     bmep: f.NonNegativeMeanPressure | None = f.optional(
         "Brake mean effective pressure, 0 at idle; [friction] adds what friction takes, and its uncertainty. With a "
@@ -165,7 +149,7 @@ class Brake:
 
 def with_load(table: GasTable | None, points: Sequence[OperatingPointTable]) -> GasTable | None:
     """Return the gas with a mean pressure; one that is not given is never used, because all points have a load."""
-    if not isinstance(table, SeiligerTable | WiebeTable) or table.imep is not None:
+    if not isinstance(table, ChargeTable) or table.imep is not None:
         return table
     without = [k for k, p in enumerate(points, 1)
                if p.gas and not p.motored and p.imep is None and p.bmep is None and p.brake_torque is None]  # fmt: skip
@@ -179,14 +163,14 @@ def with_load(table: GasTable | None, points: Sequence[OperatingPointTable]) -> 
 
 
 def operating_points(
-    tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float | None,
-    brake: Brake | None, parts: Sequence[SliderCrank], read: Callable[[RecordedGasTable, str], GasModel | None],
+    tables: Sequence[OperatingPointTable], gas_at: Callable[[OperatingPointTable, str], GasModel | None], cycle: Cycle,
+    stroke: float | None, brake: Brake | None, parts: Sequence[SliderCrank],
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
-    """Return the operating points of a file; points that give no load have the gas of [gas].
+    """Return the operating points of a file.
 
-    `read` returns the gas of recorded pressures, and names their key in complaints. The stroke [m] turns a mean piston
-    speed into a crank speed; it is None for an engine without pistons. `parts` are the slider-cranks in the order of
-    cylinder numbers.
+    `gas_at` returns the gas of a point before its load, and names the key of the point in complaints. The stroke [m]
+    turns a mean piston speed into a crank speed; it is None for an engine without pistons. `parts` are the
+    slider-cranks in the order of cylinder numbers.
     """
     points = []
     for k, table in enumerate(tables, 1):
@@ -194,9 +178,9 @@ def operating_points(
         _check_combustion(table, where)
         speeds = _speeds(table, stroke, where)
         states = cylinder_states(table, parts, where, table.name is not None)
-        base = gas if table.pressure_file is None else read(table.pressure_file, f"{where}.pressure_file")
-        is_recorded = any(isinstance(model, PressureTrace) for model in models_of(base))
-        record = partial(_recorded_friction, table, base, cycle, parts, where) if base and is_recorded else None
+        base = gas_at(table, where)
+        is_measured = base is not None and any(model.is_measured for model in base.models)
+        record = partial(_recorded_friction, table, base, cycle, parts, where) if base and is_measured else None
         for speed in speeds:
             speed_text = units.quantity_text(speed, "rad/s", 6)
             name = (f"{table.name} {speed_text}" if len(speeds) > 1 else table.name) if table.name else speed_text
@@ -295,32 +279,9 @@ def _recorded_friction(
     return float(friction)
 
 
-def _loaded_cylinders(gas: CylinderGases, table: OperatingPointTable, cycle: Cycle, where: str) -> CylinderGases:
-    # pressures of an operating point are those of the common gas; single cylinders keep their ratio to them, and
-    # chambers keep theirs
-
-    def of_model(model: CommonGas, key: str, value: float) -> float:
-        common, single = getattr(gas.common, key, None), getattr(model, key, None)
-        return value * single / common if common and single else value
-
-    def loaded(model: CommonGas) -> CommonGas:
-        if isinstance(model, Chambers):
-            return model
-        numbers = {key: of_model(model, key, value) for key, value in _pressures(table).items()}
-        one = _loaded(model, table.model_copy(update=numbers), cycle, where)
-        return model if one is None or isinstance(one, CylinderGases) else one
-
-    return gas.mapped(loaded)
-
-
-def _pressures(table: OperatingPointTable) -> dict[str, Any]:
-    # pressures that take the place of those of [gas], by key [Pa]
-    values = {key: getattr(table, key) for key in ("imep", "peak_pressure", "intake_pressure")}
-    return {key: value for key, value in values.items() if value is not None}
-
-
 def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, where: str) -> GasModel | None:
-    pressures = _pressures(table)
+    keys = ("imep", "peak_pressure", "intake_pressure")
+    pressures = {key: value for key in keys if (value := getattr(table, key)) is not None}
     for key in ("imep", "peak_pressure"):
         if table.motored and key in pressures:
             rule = "is given for a motored point, which has no combustion"
@@ -329,20 +290,25 @@ def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, wher
         return None
     if not table.motored and not pressures:
         return gas
-    if isinstance(gas, CylinderGases):
-        return _loaded_cylinders(gas, table, cycle, where)
-    if table.motored and isinstance(gas, PressureTrace) and gas.motored and not pressures:
-        return gas.motored
-    if not isinstance(gas, Seiliger | Wiebe):
-        key = "motored" if table.motored else next(iter(pressures))
-        raise Refused(
-            f"{where}.{key}",
-            None,
-            "needs [gas] with model seiliger or wiebe",
-            "give [gas] such a model, or remove this key",
-        )
-    if isinstance(gas, Wiebe) and table.peak_pressure is not None:
-        rule = "means nothing with model wiebe, whose peak follows from imep, start and duration"
-        raise Refused(f"{where}.peak_pressure", None, rule, "leave it out")
-    loaded = replace(gas, **pressures)
-    return motored_cycle(loaded, cycle) if table.motored else loaded
+
+    def loaded(model: GasModel, common: GasModel) -> GasModel:
+        # chambers beside gas that fires keep their pressures, and single cylinders their ratio to the common gas
+        if not model.fires and model is not gas:
+            return model
+        other, numbers = [key for key in pressures if key not in model.loads], dict[str, float]()
+        if other and model.loads:
+            raise Refused(f"{where}.{other[0]}", None, "means nothing with this model of [gas]", "leave it out")
+        for key, value in pressures.items():
+            of_common, single = getattr(common, key, None), getattr(model, key, None)
+            numbers[key] = value * single / of_common if model is not common and of_common and single else value
+        result = None if other else model.loaded(numbers)
+        result = result.motored(cycle) if result and table.motored else result
+        if result is None:
+            raise without_numbers
+        return result
+
+    rule, remedy = "needs [gas] with model seiliger or wiebe", "give [gas] such a model, or remove this key"
+    without_numbers = Refused(f"{where}.{'motored' if table.motored else next(iter(pressures))}", None, rule, remedy)
+    if gas is None:
+        raise without_numbers
+    return gas.mapped(lambda model: loaded(model, gas.models[0]))

@@ -18,7 +18,7 @@ from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
 from laufruhe.files.flywheel import FlywheelTable, GearedInertiaTable
-from laufruhe.files.gas import GasTable
+from laufruhe.files.gas import GAS_MODELS, GasTable, gas_type
 from laufruhe.files.load_torque import LoadTorqueTable
 from laufruhe.files.measures import ConstraintTable, ObjectiveTable
 from laufruhe.files.mounts import BlockTable, LoadCaseTable, MountsTable
@@ -224,7 +224,11 @@ def file_model() -> type[ProblemFile]:
     of_weights = {key.name: (key.annotation | None, None) for key in WEIGHT_KEYS.values()}
     weight, unbalance = (f.with_keys(table, of_weights) for table in (CounterweightTable, UnbalanceTable))
     shaft = f.with_keys(BalancerShaftTable, {"unbalances": (list[unbalance], Field(min_length=1))})  # type: ignore[valid-type]
+    of_points = {key: field for table in GAS_MODELS.values() for key, field in table.at_points.items()}
+    point = f.with_keys(OperatingPointTable, of_points)
     keys |= {
+        "operating_points": (list[point], Field(min_length=1)),  # type: ignore[valid-type]
+        "gas": (gas_type(), None),
         "counterweights": (list[weight], Field(default_factory=list)),  # type: ignore[valid-type]
         "balancer_shafts": (list[shaft], Field(default_factory=list)),  # type: ignore[valid-type]
     }

@@ -33,13 +33,13 @@ from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts,
 from laufruhe.files.fidelity import with_fidelity
 from laufruhe.files.fields import check_format
 from laufruhe.files.flywheel import flywheel_of, geared_of
-from laufruhe.files.gas import RecordedGasTable, SeiligerTable, TraceTable, WiebeTable, gas_of, needs_bore
+from laufruhe.files.gas import ChargeTable, GasContext, gas_at_point, gas_of
 from laufruhe.files.load_torque import load_torque_of
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import axes_sentences, load_cases_of, mounts_of
 from laufruhe.files.nested import at, example_at, plain, walk, with_value_at
 from laufruhe.files.numbering import REVERSED, sense_of
-from laufruhe.files.operating_points import Brake, operating_points, with_load
+from laufruhe.files.operating_points import Brake, OperatingPointTable, operating_points, with_load
 from laufruhe.files.phasing import is_open, open_phasing
 from laufruhe.files.problem_file import EXTENSION_KEYS, WEIGHT_KEYS, ExtensionContext, Note, ProblemFile, file_model
 from laufruhe.files.quantities import with_followers
@@ -193,9 +193,8 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
         raise Refused("engine.gravity", True, f"is not modelled together with {what}", "leave one of the two out")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
-    if isinstance(file.gas, TraceTable) and file.gas.cylinder_angles == "common":
-        rule = "counts angles from cylinder 1 in the firing order of the recording, and the crank is open"
-        raise Refused("gas.cylinder_angles", "common", rule, "count each column from the firing of its cylinder")
+    if file.gas is not None:
+        file.gas.check_open_crank()
     closed = partial(_assembled, file, path=path)
     return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
 
@@ -311,8 +310,8 @@ def is_study(path: Path) -> bool:
 
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:
     """Return the problem of a file with this table [engine], which has no open throws, firing order or bank angles."""
-    has_gas = any(point.gas for point in file.operating_points)
-    cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and has_gas)
+    needs_bore = file.gas is not None and file.gas.acts_on_bore and any(point.gas for point in file.operating_points)
+    cylinders, throws = moving_parts(table, gas=needs_bore)
     bearings = bearings_of(expand_bearings(file.main_bearings, throws), cylinders)
     keys = sorted(EXTENSION_KEYS.values(), key=lambda key: not key.always)
     for key in keys:
@@ -328,15 +327,13 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.crank_inertia)
     brake = _brake(file, cylinders, cycle, path.parent)
     gas_table = with_load(file.gas, file.operating_points)
-    gas = gas_of(gas_table, path.parent, cycle, cylinders)
+    gas_context = GasContext(path.parent, cycle, cylinders)
+    gas = gas_of(gas_table, gas_context)
 
-    def recorded(one: RecordedGasTable, where: str) -> GasModel | None:
-        if not isinstance(gas_table, TraceTable):
-            raise Refused(where, one.file, "needs [gas] with model trace", "give [gas] that model and a file")
-        keys = {key: getattr(one, key) for key in one.model_fields_set}
-        return gas_of(gas_table.model_copy(update=keys), path.parent, cycle, cylinders, where)
+    def gas_at(point: OperatingPointTable, where: str) -> GasModel | None:
+        return gas_at_point(gas_table, gas, point, replace(gas_context, where=where))
 
-    points = operating_points(file.operating_points, gas, cycle, table.stroke, brake, cylinders, recorded)
+    points = operating_points(file.operating_points, gas_at, cycle, table.stroke, brake, cylinders)
     if without_gas:
         points = tuple(replace(point, gas=None) for point in points)
     geared, of_geared = geared_of(file.geared_inertias)
@@ -394,7 +391,7 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
     has_brake = any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points)
     if (
         has_brake
-        and isinstance(file.gas, SeiligerTable | WiebeTable)
+        and isinstance(file.gas, ChargeTable)
         and any(row.imep is not None for row in file.gas.single_cylinders)
     ):
         rule = "shares a load at the brake equally, and [[gas.single_cylinders]] have an imep of their own"

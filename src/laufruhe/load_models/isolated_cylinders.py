@@ -10,8 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from laufruhe.machine import Chambers, Engine, Rotor, SliderCrank
-from laufruhe.machine.chambers import CylinderGases
+from laufruhe.machine import Engine, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -71,17 +70,8 @@ def split_by_bank(upright: ComplexArray, across: ComplexArray, upside: ComplexAr
 
 def only_gas_of(problem: Problem, name: str) -> Problem:
     """Return the problem with gas pressure in the named cylinder only."""
-    points = []
-    for point in problem.points:
-        gas = point.gas
-        if isinstance(gas, CylinderGases):
-            gas = gas.of_cylinder(name)
-            point = replace(point, gas=gas)
-        if isinstance(gas, Chambers):
-            chambers = [replace(chamber, cylinders=(name,)) for chamber in gas.chambers if name in chamber.cylinders]
-            point = replace(point, gas=replace(gas, chambers=tuple(chambers)) if chambers else None)
-        # massless copies have no bore, so that other gas models do not act on them
-        points.append(point)
+    # massless copies have no bore, so that gas with a pressure for each cylinder does not act on them
+    points = [replace(point, gas=point.gas and point.gas.only(name)) for point in problem.points]
     return replace(problem, points=tuple(points))
 
 

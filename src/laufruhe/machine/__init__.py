@@ -2,10 +2,12 @@
 
 from laufruhe.machine.block import Block
 from laufruhe.machine.bodies import Rod
-from laufruhe.machine.chambers import Chamber, Chambers, Compressor, GasModel, Pump, Steam
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.flywheel import Arms, Flywheel, Rim
-from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, TrappedCharge, Wiebe
+from laufruhe.machine.gas.base import GasModel
+from laufruhe.machine.gas.charge import Charge, TrappedCharge
+from laufruhe.machine.gas.seiliger import Seiliger
+from laufruhe.machine.gas.wiebe import Wiebe
 from laufruhe.machine.load_torque import LoadTorque
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Bearing, GearedInertia, Role, Rotor, Shaft
@@ -16,10 +18,7 @@ __all__ = [
     "Arms",
     "Bearing",
     "Block",
-    "Chamber",
-    "Chambers",
     "Charge",
-    "Compressor",
     "Cycle",
     "Engine",
     "Flywheel",
@@ -28,8 +27,6 @@ __all__ = [
     "LoadTorque",
     "Mount",
     "OperatingPoint",
-    "PressureTrace",
-    "Pump",
     "Rim",
     "Rod",
     "Role",
@@ -37,7 +34,6 @@ __all__ = [
     "Seiliger",
     "Shaft",
     "SliderCrank",
-    "Steam",
     "TrappedCharge",
     "Wiebe",
 ]

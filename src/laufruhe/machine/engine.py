@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.block import Block, LoadCase
-from laufruhe.machine.chambers import GasModel
 from laufruhe.machine.extra import Extra, MachineTorque
 from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.machine.flywheel import Flywheel
@@ -24,6 +23,9 @@ from laufruhe.machine.rotor import Bearing, GearedInertia, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.numerics.exact_angles import as_turn, cis, direction, reduced_turn
 from laufruhe.numerics.spectrum import as_order
+
+if TYPE_CHECKING:
+    from laufruhe.machine.gas.base import GasModel
 
 E = TypeVar("E", bound=Extra)
 
@@ -72,6 +74,11 @@ class OperatingPoint:
     gas: GasModel | None = None
     weight: float = 1.0
     fmep: float = 0.0
+
+    @property
+    def gas_models(self) -> tuple[GasModel, ...]:
+        """Models of the gas of all cylinders, each once; empty without gas."""
+        return self.gas.models if self.gas else ()
 
 
 @dataclass(frozen=True)

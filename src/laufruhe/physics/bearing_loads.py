@@ -32,7 +32,6 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.exact_angles import as_turn, cis, star_sum
 from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import pressure_breaks, thrust_at
 from laufruhe.physics.mechanism import orders_of_masses
 from laufruhe.physics.shaking_loads import rotor_loads, rotor_wrench
 from laufruhe.physics.star_loads import order_index, spread
@@ -243,11 +242,11 @@ def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fideli
     def loads(angles: Array) -> Array:
         total: Array | float = 0.0
         for since in (angles + lag for lag in part.swept.lags):
-            thrust = thrust_at(gas, part, cycle, since) * part.lean(np, since)
+            thrust = gas.thrust(part, cycle, since) * part.lean(np, since)
             total += np.stack(_reactions(part, part.fires_at + part.shaft.ratio * since, thrust, False), axis=1)
         return np.asarray(total)
 
-    from_firing = spectrum_with_kinks(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
+    from_firing = spectrum_with_kinks(loads, fidelity.gas_steps, cycle.base_order, gas.breaks(part, cycle))
     return fidelity.truncated_gas(from_firing.shift(as_turn(part.firing_angle) / cycle.turns, part.firing_angle))
 
 

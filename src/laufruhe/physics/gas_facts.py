@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
-from laufruhe.machine import Chambers, Cycle, Engine, OperatingPoint, PressureTrace, SliderCrank
-from laufruhe.machine.chambers import Chamber, CylinderGases
-from laufruhe.numerics.arrays import Array
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, SliderCrank
+from laufruhe.machine.gas.base import chamber_cycle_of
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import OneChamber, chamber_cycle_of, pressure_at
 from laufruhe.physics.gas_loads import gas_coefficients
-from laufruhe.physics.pressure_trace import peak_angle
 from laufruhe.physics.willans import mean_torque
-from laufruhe.physics.working_chambers import chamber_pressure
-
-_STEPS, _ROUNDING = 7200, 1e-9
-"""Number of crank angles at which the pressure of a cycle is compared, and relative rounding error of a plateau."""
 
 
 @dataclass(frozen=True)
@@ -60,20 +51,12 @@ def cylinder_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = E
 
     Cylinders that differ in gas and the working chambers of a rod have figures of their own.
     """
-    gas, engines = fidelity.gas_of(point), [(point.name, point, engine)]
-    if isinstance(gas, Chambers):
-        return [
-            (f"{point.name}, {chamber.name}", _chamber_facts(engine, point, gas, chamber, fidelity))
-            for chamber in gas.chambers
-        ]
-    if isinstance(gas, CylinderGases):
-        engines = [
-            (f"{point.name}, {part.name}", replace(point, gas=gas.of_cylinder(part.name)), alone)
-            for part in engine.cylinders
-            for alone in [replace(engine, slider_cranks=(part,))]
-        ]
-    facts = ((name, gas_facts(alone, one_point, fidelity)) for name, one_point, alone in engines)
-    return [(name, figures) for name, figures in facts if figures is not None]
+    gas = fidelity.gas_of(point)
+    shares = gas.shares(engine) if gas is not None and engine.slider_cranks else ()
+    return [
+        (f"{point.name}, {name}" if name else point.name, _facts(one, parts, engine.cycle, point, fidelity))
+        for name, one, parts in shares
+    ]
 
 
 def gas_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> GasFacts | None:
@@ -81,50 +64,25 @@ def gas_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT)
 
     The result is None without gas, for several chambers on a rod, and for an engine whose cylinders differ in gas.
     """
-    gas, parts = fidelity.gas_of(point), engine.slider_cranks
-    if gas is None or isinstance(gas, Chambers | CylinderGases) or not parts:
-        return None
-    torques = [float(gas_coefficients(gas, part, engine.cycle, fidelity).coefficients[0].real) for part in parts]
-    swept = [part.swept.piston.piston_area * part.swept.piston.stroke for part in parts]
+    return dict(cylinder_facts(engine, point, fidelity)).get(point.name)
+
+
+def _facts(
+    gas: GasModel, parts: Sequence[SliderCrank], cycle: Cycle, point: OperatingPoint, fidelity: Fidelity
+) -> GasFacts:
+    torques = [float(gas_coefficients(gas, part, cycle, fidelity).coefficients[0].real) for part in parts]
+    swept = [gas.swept_volume(part) for part in parts]
     first = max(range(len(parts)), key=lambda k: swept[k])
-    cycle, pace = chamber_cycle_of(parts[first], engine.cycle)
-    period = cycle.angle / pace
+    chamber_cycle, pace = chamber_cycle_of(parts[first], cycle)
+    period = chamber_cycle.angle / pace
     work = torques[first] * period / len(parts[first].swept.lags)
-    peak, angle, minimum = _extremes(gas, parts[first], engine.cycle, period)
-    recording = gas.recording if isinstance(gas, PressureTrace) else ()
+    peak, angle, minimum = _extremes(gas, parts[first], cycle)
     return GasFacts(
         peak, math.remainder(angle, period), minimum, work / swept[first], sum(torques), sum(torques) * point.speed,
-        mean_torque(point.fmep, sum(swept), engine.cycle.turns), point.fmep, sum(swept), recording,
-    )  # fmt: skip
-
-
-def _chamber_facts(
-    engine: Engine, point: OperatingPoint, gas: Chambers, chamber: Chamber, fidelity: Fidelity
-) -> GasFacts:
-    """Return the key figures of one chamber, which works once a turn (G14)."""
-    parts = [part for part in engine.slider_cranks if part.name in chamber.cylinders]
-    alone = replace(gas, chambers=(chamber,))
-    torque = sum(float(gas_coefficients(alone, part, engine.cycle, fidelity).coefficients[0].real) for part in parts)
-    peak, angle, minimum = _sampled_extremes(lambda angles: chamber_pressure(chamber, parts[0], angles), math.tau)
-    swept = chamber.swept_volume(parts)
-    return GasFacts(
-        peak, math.remainder(angle, math.tau), minimum,
-        torque * math.tau / swept, torque, torque * point.speed,
-        mean_torque(point.fmep, swept, engine.cycle.turns), point.fmep, swept, (),
+        mean_torque(point.fmep, sum(swept), cycle.turns), point.fmep, sum(swept), gas.recording,
     )  # fmt: skip
 
 
 @lru_cache(maxsize=64)
-def _extremes(gas: OneChamber, part: SliderCrank, cycle: Cycle, period: float) -> tuple[float, float, float]:
-    # largest pressure, its angle after firing, and least pressure
-    if isinstance(gas, PressureTrace):
-        return max(gas.pressures), peak_angle(np.array(gas.angles), np.array(gas.pressures)), min(gas.pressures)
-    # at a dead centre the pressure is that after ignition
-    return _sampled_extremes(lambda angles: pressure_at(gas, part, cycle, angles + _ROUNDING), period)
-
-
-def _sampled_extremes(pressure: Callable[[Array], Array], period: float) -> tuple[float, float, float]:
-    angles = period * np.arange(_STEPS) / _STEPS
-    pressures = pressure(angles)
-    peak = int(np.argmax(pressures > (1.0 - _ROUNDING) * pressures.max()))
-    return float(pressures[peak]), float(angles[peak]), float(pressures.min())
+def _extremes(gas: GasModel, part: SliderCrank, cycle: Cycle) -> tuple[float, float, float]:
+    return gas.extremes(part, cycle)

@@ -10,13 +10,11 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
-from laufruhe.machine.chambers import cylinder_gas
 from laufruhe.machine.slider_crank import displacement
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.exact_angles import Turn, as_turn, star_orders
 from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
 from laufruhe.physics.rigid_body import ROLL
 from laufruhe.physics.willans import mean_torque
 
@@ -38,7 +36,7 @@ def _gas_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], gas: GasModel, fide
     # equal mechanisms differ only in their firing angles
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in parts:
-        alike[alike_under(gas, part), part.shaft.ratio].append(part)
+        alike[gas.alike(part), part.shaft.ratio].append(part)
     total = Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
     for star in alike.values():
         # torque of one cylinder at the firing angles of several
@@ -64,8 +62,8 @@ def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: F
 
     Angles count from its firing: a cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
-    key = _CylinderKey((type(part), alike_under(gas, part), part.shaft.ratio), part)
-    return fidelity.truncated_gas(_one_cylinder(cylinder_gas(gas, part), key, cycle, fidelity.gas_steps))
+    key = _CylinderKey((type(part), gas.alike(part), part.shaft.ratio), part)
+    return fidelity.truncated_gas(_one_cylinder(gas.of_cylinder(part.name), key, cycle, fidelity.gas_steps))
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ def _one_cylinder(gas: GasModel, key: _CylinderKey, cycle: Cycle, samples: int) 
     def torque_at(angles: Array) -> Array:
         return np.asarray(np.sum([chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags], axis=0))
 
-    torque = spectrum_with_kinks(torque_at, samples, cycle.base_order, pressure_breaks(gas, part, cycle))
+    torque = spectrum_with_kinks(torque_at, samples, cycle.base_order, gas.breaks(part, cycle))
     torque.coefficients.setflags(write=False)
     return torque
 
@@ -93,4 +91,4 @@ def chamber_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, since: Array)
     """Return the torque of a piston or one rotor chamber at crank angles after it fired [N m] (L5, Y4)."""
     piston, pace = part.swept.piston, part.swept.pace
     alpha = piston.fires_at + piston.shaft.ratio * pace * since
-    return np.asarray(pace * piston.shaft.ratio * thrust_at(gas, part, cycle, since) * piston.velocity(np, alpha))
+    return np.asarray(pace * piston.shaft.ratio * gas.thrust(part, cycle, since) * piston.velocity(np, alpha))

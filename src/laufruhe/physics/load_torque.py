@@ -14,7 +14,7 @@ import numpy as np
 from laufruhe.machine import Cycle, Engine, LoadTorque, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.pressure_trace import periodic_cubics
+from laufruhe.physics.measured_cycle import periodic_cubics
 from laufruhe.physics.rigid_body import ROLL
 
 

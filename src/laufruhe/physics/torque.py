@@ -23,8 +23,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, SliderCrank, TrappedCharge
-from laufruhe.machine.chambers import CylinderGases
+from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.roots import rising_root
 from laufruhe.numerics.spectrum import Spectrum
@@ -34,7 +33,6 @@ from laufruhe.physics.gravity import with_gravity
 from laufruhe.physics.load_torque import less_load
 from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, orders_of_masses, reduced, two_order_roll
 from laufruhe.physics.rigid_body import ROLL
-from laufruhe.physics.seiliger_cycle import motored_gas
 from laufruhe.physics.star_loads import star_loads
 from laufruhe.physics.uneven_speed import driving_torque, gas_torque, moving_inertia, start_energy
 
@@ -75,27 +73,16 @@ def turning_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = E
 
     It is None for gas whose pressure without combustion is not known.
     """
-    try:
-        gas = _unfired(fidelity.gas_of(point), engine.cycle)
-    except LookupError:
+    gas = fidelity.gas_of(point)
+    motored = gas and gas.motored(engine.cycle)
+    if gas and not motored:
         return None
-    still = with_gravity(gas_torque(engine, replace(point, gas=gas, fmep=0.0), fidelity), engine, fidelity)
+    still = with_gravity(gas_torque(engine, replace(point, gas=motored, fmep=0.0), fidelity), engine, fidelity)
     steps = FINE_WORK * fidelity.samples
     angles = np.concatenate([engine.cycle.angle * np.arange(steps) / steps, still.kink_angles])
     needed = -np.concatenate([still.sample(steps), still.values(still.kink_angles)])
     k = int(np.argmax(needed))
     return TurningTorque(max(float(needed[k]), 0.0), float(angles[k]))
-
-
-def _unfired(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
-    if isinstance(gas, CylinderGases):
-        return gas.mapped(lambda one: _unfired(one, cycle))  # type: ignore[arg-type, return-value]
-    if gas is None or isinstance(gas, TrappedCharge):
-        return gas
-    motored = motored_gas(gas, cycle)
-    if motored is None:
-        raise LookupError("pressure without combustion")
-    return motored
 
 
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-
 from laufruhe.errors import counted
-from laufruhe.machine import PressureTrace
-from laufruhe.machine.chambers import GasModel, models_of
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts
 from laufruhe.present.numbers import DEGREE, trimmed
 from laufruhe.problem.advice import ADVICE
@@ -32,20 +28,8 @@ def gas_rows(problem: Problem) -> list[tuple[str, ...]]:
 
 
 def gas_note(problem: Problem) -> list[str]:
-    """Return sentences on how the files of recorded traces were read, and those of extensions."""
-    recorded = [sentence for _, facts in _facts(problem) for sentence in facts.recording]
-    speeds = defaultdict[GasModel, set[float]](set)
-    for point in problem.points:
-        gas = problem.fidelity.gas_of(point)
-        if gas and any(isinstance(model, PressureTrace) for model in models_of(gas)):
-            speeds[gas].add(point.speed)
-    recorded += [
-        f"One record counts at {len(several)} speeds; pressure_file of an operating point gives another."
-        for several in speeds.values()
-        if len(several) > 1
-    ]
-    further = (sentence for advice in ADVICE.values() for sentence in advice.about_gas(problem))
-    return list(dict.fromkeys([*recorded, *further]))
+    """Return the sentences of extensions about the gas."""
+    return list(dict.fromkeys(sentence for advice in ADVICE.values() for sentence in advice.about_gas(problem)))
 
 
 def gas_lines(problem: Problem) -> list[str]:

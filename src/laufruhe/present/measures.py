@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.machine import Chambers
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
@@ -150,7 +149,7 @@ def has_mounts(result: Result) -> bool:
 
 def has_firing(result: Result) -> bool:
     """Return True if cylinders fire; chambers of steam and pumps do not."""
-    return not any(isinstance(point.gas, Chambers) for point in result.problem.points)
+    return all(point.gas is None or point.gas.fires for point in result.problem.points)
 
 
 def firing_words(result: Result) -> tuple[str, str]:

@@ -11,9 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from laufruhe.machine import Cycle, PressureTrace
-from laufruhe.machine.chambers import CommonGas, CylinderGases, models_of
-from laufruhe.numerics.kinks import SAME_ANGLE
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.problem.dependence import keeps_omitted, open_kinds
@@ -30,9 +27,8 @@ from laufruhe.problem.problem import Problem
 
 REFERENCE_SAMPLES = 5760
 """Number of samples over the cycle of the reference, with which cheaper models are compared."""
-STRAIGHT, FEWEST = 8, 16
-"""Number of linear pieces between two points of a pressure trace, and smallest number of points of a trace from which
-every second one may be dropped."""
+FINER = 8
+"""Number of angles for each sample of the gas at which a change of measured points is compared."""
 ROUNDING = 2e-12
 """Relative rounding error of sums of a few thousand terms (F9)."""
 
@@ -163,14 +159,13 @@ def gas_step_bound(problem: Problem, evaluation: Evaluation) -> float:
 def trace_error(problem: Problem, evaluation: Evaluation) -> float:
     """Return the error of the objective from the points of measured traces, the same for all designs (F9a)."""
     fidelity = without_time(evaluation.fidelity)
-    models = (model for loads in evaluation.loads for model in models_of(fidelity.gas_of(loads.point)))
-    if not any(isinstance(model, PressureTrace) for model in models):
+    gases = [fidelity.gas_of(point) for point in problem.points]
+    if not any(model.is_measured for gas in gases if gas is not None for model in gas.models):
         return 0.0
     initial = evaluation if fidelity is evaluation.fidelity else evaluate(problem.at(fidelity), evaluation.engine)
     changes, cycle = [], evaluation.engine.cycle
-    for change in (lambda gas: _straight(gas, cycle), _thinned):
-        gases = map(fidelity.gas_of, problem.points)
-        changed_gases = [g.mapped(change) if isinstance(g, CylinderGases) else g and change(g) for g in gases]
+    for k in range(2):
+        changed_gases = [gas and gas.approximations(cycle)[k] for gas in gases]
         points = tuple(replace(p, gas=gas) for p, gas in zip(problem.points, changed_gases, strict=True))
         changed = evaluate(replace(problem, points=points, fidelity=fidelity), evaluation.engine)
         terms = (term for term in problem.objective if term.measure.is_load)
@@ -184,22 +179,4 @@ def _norm_of_difference(measure: Measure, ours: Evaluation, theirs: Evaluation) 
     differences = [measure.load.signal(a) + measure.load.signal(b).mapped(np.negative) for a, b in pairs]
     engine, points = ours.engine, [loads.point for loads in ours.loads]
     signals = with_common_base(engine.cycle.base_order, differences)
-    return load_rows(measure, points, signals, engine, STRAIGHT * ours.fidelity.gas_steps).value
-
-
-def _straight(gas: CommonGas, cycle: Cycle) -> CommonGas:
-    if not isinstance(gas, PressureTrace):
-        return gas
-    angles, pressures = list(gas.angles), list(gas.pressures)
-    if angles[-1] < angles[0] + cycle.angle - SAME_ANGLE:
-        angles, pressures = [*angles, angles[0] + cycle.angle], [*pressures, pressures[0]]
-    places = np.arange(STRAIGHT * (len(angles) - 1) + 1) / STRAIGHT
-    resampled = [tuple(np.interp(places, range(len(angles)), column).tolist()) for column in (angles, pressures)]
-    return replace(gas, angles=resampled[0], pressures=resampled[1])
-
-
-def _thinned(gas: CommonGas) -> CommonGas:
-    if not isinstance(gas, PressureTrace) or len(gas.angles) < FEWEST:
-        return gas
-    keeps = [*range(0, len(gas.angles) - 1, 2), len(gas.angles) - 1]
-    return replace(gas, angles=tuple(gas.angles[k] for k in keeps), pressures=tuple(gas.pressures[k] for k in keeps))
+    return load_rows(measure, points, signals, engine, FINER * ours.fidelity.gas_steps).value

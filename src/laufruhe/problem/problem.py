@@ -16,7 +16,6 @@ from laufruhe.errors import Complaint, ModelError, counted, wrong_call
 from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint, SliderCrank
 from laufruhe.machine.facing import Facing
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.problem.advice import ADVICE
 from laufruhe.problem.decision import Decision, Numbers, apply_decisions
@@ -322,7 +321,7 @@ class Problem(Goals, Statements):
         if not gases or not self.depends_on_gas:
             return False
         parts = map(_without_rounding, self.engine.cylinders)
-        return len({tuple(alike_under(gas, part) for gas in gases) for part in parts}) > 1
+        return len({tuple(gas.alike(part) for gas in gases) for part in parts}) > 1
 
     @property
     def cylinders_are_alike(self) -> bool:

@@ -44,49 +44,49 @@ class EngineParts(Parts):
         self, name: str | None = None, *, misfire: Sequence[int] | Literal["each"] | None = None,
         cut: Sequence[int] | None = None, cut_valves: Literal["closed", "open"] | None = None,
         speed: Value | None = None, mean_piston_speed: Value | None = None, imep: Value | None = None,
-        peak_pressure: Value | None = None, intake_pressure: Value | None = None,
-        pressure_file: str | Table | None = None, bmep: Value | None = None, brake_torque: Value | None = None,
-        motored: bool | None = None, gas: bool | None = None, up_to: Value | None = None, steps: int | None = None,
-        weight: Value | None = None,
+        peak_pressure: Value | None = None, intake_pressure: Value | None = None, bmep: Value | None = None,
+        brake_torque: Value | None = None, motored: bool | None = None, gas: bool | None = None,
+        up_to: Value | None = None, steps: int | None = None, weight: Value | None = None,
+        pressure_file: str | Table | None = None,
     ) -> Self:
         """Return the engine with an operating point. Speeds and loads at which the engine is looked at."""
         return self._with("operating_points", "operating_point", keys_of(locals()))
 
     def gas_seiliger(
-        self, *, peak_pressure: Value, single_cylinders: Sequence[Table] | None = None,
-        chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
-        intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
-        crankcase_pressure: Value | None = None, imep: Value | None = None, compression_exponent: Value | None = None,
-        expansion_exponent: Value | None = None,
+        self, *, peak_pressure: Value, crankcase_pressure: Value | None = None, compression_ratio: Value | None = None,
+        intake_pressure: Value | None = None, exhaust_pressure: Value | None = None, imep: Value | None = None,
+        single_cylinders: Sequence[Table] | None = None, compression_exponent: Value | None = None,
+        expansion_exponent: Value | None = None, chambers: Sequence[Table] | None = None,
     ) -> Self:
         """Return the engine with gas seiliger. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_seiliger", keys_of(locals(), {'model': 'seiliger'}))
 
     def gas_wiebe(
-        self, *, start: Value, duration: Value, single_cylinders: Sequence[Table] | None = None,
-        chambers: Sequence[Table] | None = None, compression_ratio: Value | None = None,
-        intake_pressure: Value | None = None, exhaust_pressure: Value | None = None,
-        crankcase_pressure: Value | None = None, imep: Value | None = None, shape: Value | None = None,
-        completeness: Value | None = None, heat_ratio: Value | None = None,
+        self, *, start: Value, duration: Value, crankcase_pressure: Value | None = None,
+        compression_ratio: Value | None = None, intake_pressure: Value | None = None,
+        exhaust_pressure: Value | None = None, imep: Value | None = None,
+        single_cylinders: Sequence[Table] | None = None, shape: Value | None = None, completeness: Value | None = None,
+        heat_ratio: Value | None = None, chambers: Sequence[Table] | None = None,
     ) -> Self:
         """Return the engine with gas wiebe. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_wiebe", keys_of(locals(), {'model': 'wiebe'}))
 
+    def gas_chambers(self, *, chambers: Sequence[Table], crankcase_pressure: Value | None = None) -> Self:
+        """Return the engine with gas chambers. Pressure in the cylinders; without it no gas is computed."""
+        return self._with("gas", "gas_chambers", keys_of(locals(), {'model': 'chambers'}))
+
     def gas_trace(
-        self, *, file: str, single_cylinders: Sequence[Table] | None = None, chambers: Sequence[Table] | None = None,
-        sheet: str | None = None, angle_column: str | int | None = None, angle_unit: str | None = None,
+        self, *, file: str, crankcase_pressure: Value | None = None, sheet: str | None = None,
+        angle_column: str | int | None = None, angle_unit: str | None = None,
         cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
         pressure_column: str | int | Sequence[str | int] | None = None, pressure_unit: str | None = None,
         gauge: bool | None = None, peg: Table | None = None, angle_zero: Number | None = None,
         cylinder_columns: Sequence[str | int] | None = None, motored_column: str | int | None = None,
-        cylinder_angles: Literal["own", "common"] | None = None, crankcase_pressure: Value | None = None,
+        cylinder_angles: Literal["own", "common"] | None = None, single_cylinders: Sequence[Table] | None = None,
+        chambers: Sequence[Table] | None = None,
     ) -> Self:
         """Return the engine with gas trace. Pressure in the cylinders; without it no gas is computed."""
         return self._with("gas", "gas_trace", keys_of(locals(), {'model': 'trace'}))
-
-    def gas_chambers(self, *, chambers: Sequence[Table], crankcase_pressure: Value | None = None) -> Self:
-        """Return the engine with gas chambers. Pressure in the cylinders; without it no gas is computed."""
-        return self._with("gas", "gas_chambers", keys_of(locals(), {'model': 'chambers'}))
 
     def friction(
         self, *, file: str | None = None, kind: Literal["fuel", "motoring"] | None = None,

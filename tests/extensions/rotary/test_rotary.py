@@ -12,14 +12,14 @@ import pytest
 from numpy.typing import NDArray
 
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.files.reader import load_tables
-from laufruhe.machine import Engine, OperatingPoint, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine import Engine, OperatingPoint, Seiliger, Wiebe
+from laufruhe.machine.gas.charge import chamber_volume
 from laufruhe.numerics.exact_angles import cis
 from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
-from laufruhe.physics.cylinder_volume import chamber_volume
 from laufruhe.physics.fidelity import EXACT
-from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque, swing_of
 from laufruhe.physics.uneven_speed import crank_motion
@@ -102,7 +102,7 @@ class TestGas:
         """Return for each chamber the angle since it fired, and its pressure above the crankcase [Pa]."""
         whole = 6.0 * math.pi
         since = [(phi + math.tau * k) % whole for k in range(3)]
-        pressures = [float(pressure_at(GAS, UNIT, _of(UNIT).cycle, np.array([at]))[0]) for at in since]
+        pressures = [float(GAS.pressure(UNIT, _of(UNIT).cycle, np.array([at]))[0]) for at in since]
         return [(at, pressure - GAS.crankcase_pressure) for at, pressure in zip(since, pressures, strict=True)]
 
     @pytest.mark.parametrize("phi", [0.1, 1.3, 2.9, 4.4, 6.0])
@@ -158,7 +158,7 @@ class TestGas:
     @pytest.mark.slow
     def test_a_trace_over_three_turns_of_the_shaft_gives_the_same(self) -> None:
         angles = np.linspace(0.0, 6.0 * math.pi, 4321)[:-1]
-        pressures = pressure_at(GAS, UNIT, _of(UNIT).cycle, angles)
+        pressures = GAS.pressure(UNIT, _of(UNIT).cycle, angles)
         trace = PressureTrace(tuple(angles), tuple(pressures), GAS.crankcase_pressure)
         found, expected = (crank_torque(_of(UNIT), replace(self.point, gas=own)).sample(90) for own in (trace, GAS))
         np.testing.assert_allclose(found, expected, atol=1e-4 * np.abs(expected).max())

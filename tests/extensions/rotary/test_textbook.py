@@ -9,7 +9,6 @@ import pytest
 
 from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.machine import Cycle, Engine, Seiliger
-from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.gas_loads import gas_loads
 from one_cylinder import rotating_loads
 
@@ -46,7 +45,7 @@ class TestRotary:
         torque = np.zeros(len(turned))
         for ahead in (0.0, math.tau, 2.0 * math.tau):
             phi = turned + 0.5 * math.pi + ahead
-            force = pressure_at(gas, self.unit, Cycle.TWO_STROKE, phi - 1.5 * math.pi) - gas.crankcase_pressure
+            force = gas.pressure(self.unit, Cycle.TWO_STROKE, phi - 1.5 * math.pi) - gas.crankcase_pressure
             torque -= 0.015 * force * self.unit.piston_area * np.sin(2.0 * phi / 3.0)
         engine = Engine("rotary", Cycle.TWO_STROKE, (self.unit,))
         result = gas_loads(engine, gas).values(turned - math.pi)[:, 3]

@@ -13,7 +13,7 @@ import numpy as np
 from laufruhe import load
 from laufruhe.extensions.skip_fire.torque import FiringModel
 from laufruhe.files.cylinder_states import CylinderState
-from laufruhe.physics.seiliger_cycle import seiliger_cut_off
+from laufruhe.machine.gas.seiliger import seiliger_cut_off
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 STATES = ("closed valves", "open valves", "misfire")

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.chambers.gas import Chamber, Chambers, Pump
 from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
-from laufruhe.machine import Chamber, Chambers, Cycle, Engine, OperatingPoint, Pump, Shaft
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Shaft
 from laufruhe.machine.rotor import CRANKSHAFT
 from laufruhe.machine.scaling import scale_part
 from laufruhe.physics.shaking_loads import shaking_loads

@@ -5,16 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
-
-import numpy as np
 
 from laufruhe.errors import Complaint, ModelError
-from laufruhe.machine import Engine, OperatingPoint, PressureTrace
-from laufruhe.machine.chambers import models_of
+from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.mount import every_spring
-from laufruhe.physics.gas_facts import GasFacts, cylinder_facts, gas_facts
-from laufruhe.physics.pressure_trace import bottom_pressure
+from laufruhe.physics.gas_facts import cylinder_facts, gas_facts
 from laufruhe.problem.advice import Advice
 from laufruhe.problem.decision import Kind, NumberDrive
 from laufruhe.problem.problem import Problem
@@ -39,8 +34,6 @@ MAX_PEAK, MIN_GAS = 300e5, 0.1e5
 """Largest usual peak pressure, and least usual absolute pressure in a cylinder [Pa]; diesel engines reach 250 bar."""
 MAX_KILOPASCAL = 30_000e5
 """Largest usual peak pressure if kPa are taken as bar [Pa]."""
-MAX_INTAKE, LEAST_RISE = 2e5, 25.0
-"""Largest pressure before compression that raises no doubt [Pa], and least ratio of the peak to a larger one."""
 LATEST_PEAK = math.radians(60.0)
 """Largest usual angle between firing and peak pressure."""
 MAX_POWER = 250e6
@@ -60,7 +53,6 @@ def _warnings(problem: Problem) -> tuple[Complaint, ...]:
     warnings += [
         *([] if problem.fires_together or problem.phasing is not None else _of_firing(engine)),
         *_of_gas(engine, points),
-        *_of_motored_traces(engine, points),
         *_of_machines(engine, points),
     ]
     first: dict[str, Complaint] = {}
@@ -139,9 +131,9 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
         with suppress(ModelError):
             # the evaluation reports a cycle that cannot be met
             facts = gas_facts(engine, point)
-        if facts is None:
+        if facts is None or gas is None:
             continue
-        is_trace = isinstance(gas, PressureTrace)
+        is_trace = gas.is_measured
         peak = quantity_text(1e-5 * facts.peak_pressure, "bar")
         if facts.peak_pressure > MAX_PEAK:
             rule = "is more than 300 bar; diesel engines reach 250 bar"
@@ -154,10 +146,8 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
             yield Complaint(
                 "least pressure of the gas", lowest, rule, "check gauge and peg; pressures must be absolute"
             )
-        if isinstance(gas, PressureTrace):
-            yield from _of_trace(gas, facts, engine.cycle.angle)
-            if gas.is_motored:
-                continue
+        if gas.motored(engine.cycle) is gas:
+            continue
         lies_late = abs(facts.peak_angle) > LATEST_PEAK and facts.peak_pressure > 2.0 * abs(facts.least_pressure)
         angle = math.degrees(facts.peak_angle)
         place = f"the peak of {peak} lies {angle:.4g} deg after the firing dead centre"
@@ -202,27 +192,6 @@ def _of_machines(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[C
                 )
                 remedy = f"give a sum of {quantity_text(-brake_torque, 'N m')}, or leave mean_torque out"
                 yield Complaint("mean torque of the electric machines", quantity_text(driving, "N m"), rule, remedy)
-
-
-def _of_trace(trace: PressureTrace, facts: GasFacts, period: float) -> Iterator[Complaint]:
-    bottom = bottom_pressure(np.array(trace.angles), np.array(trace.pressures), period)
-    is_charged = bottom > MAX_INTAKE and facts.peak_pressure < LEAST_RISE * bottom
-    if is_charged and not trace.is_motored and abs(facts.peak_angle) < LATEST_PEAK:
-        value, peak = (quantity_text(1e-5 * pressure, "bar") for pressure in (bottom, facts.peak_pressure))
-        rule = f"is more than usual before compression to a peak of {peak}"
-        yield Complaint("pressure at the bottom dead centre", value, rule, "check peg and gauge")
-
-
-def _of_motored_traces(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
-    # also those that no operating point uses, because they show the dead centre of the file
-    for point in points:
-        traces = [gas for gas in models_of(point.gas) if isinstance(gas, PressureTrace)]
-        for trace in dict.fromkeys(trace if trace.is_motored else trace.motored for trace in traces):
-            facts = gas_facts(engine, replace(point, gas=trace))
-            if facts is not None and (facts.imep > 0.0 or facts.peak_angle > 0.0):
-                rule = f"has its peak {quantity_text(facts.peak_angle, 'rad', 2)} after dead centre"
-                remedy = "check angle_zero; losses move the peak of a motored cylinder 0.3 to 1 deg before dead centre"
-                yield Complaint("motored pressure", "", rule, remedy)
 
 
 ADVICE = Advice("numbers to check", about_problem=_warnings)

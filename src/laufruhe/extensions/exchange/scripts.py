@@ -16,7 +16,6 @@ from laufruhe.extensions.exchange.components import MADE_BY
 from laufruhe.machine import Engine, OperatingPoint, SliderCrank
 from laufruhe.machine.slider_crank import OffsetCrank
 from laufruhe.numerics.spectrum import JUMP_OFFSET
-from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.problem.evaluation import with_common_base
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
@@ -98,7 +97,7 @@ def _pressing(engine: Engine, part: SliderCrank, point: OperatingPoint) -> list[
     count = 2 * _STEPS * engine.cycle.turns
     angles = engine.cycle.angle * np.arange(count) / count + JUMP_OFFSET - part.firing_angle
     assert point.gas is not None
-    return [-float(force) for force in thrust_at(point.gas, part, engine.cycle, angles)]
+    return [-float(force) for force in point.gas.thrust(part, engine.cycle, angles)]
 
 
 def _torsion_data(result: Result) -> dict[str, Any]:

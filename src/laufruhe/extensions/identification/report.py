@@ -12,7 +12,7 @@ import numpy as np
 
 from laufruhe.cli.screen import Output, typed
 from laufruhe.errors import refused
-from laufruhe.extension import extensions
+from laufruhe.extension import is_installed
 from laufruhe.extensions.identification.estimate import CONFIDENCE, LARGE, Estimate, estimate
 from laufruhe.extensions.identification.file import MEASUREMENTS, MeasurementTable, measurements_of
 from laufruhe.extensions.identification.measurement import Measurement
@@ -113,7 +113,7 @@ def with_estimates(problem: Problem, answer: Estimate) -> Problem:
 
     Sizes have their tolerance, three standard deviations, if the extension of tolerances is installed (R9).
     """
-    has_tolerances = any(extension.name == "robust" for extension in extensions())
+    has_tolerances = is_installed("robust")
     for domain in answer.domains:
         name, unit, parts = domain.decision.name, domain.decision.unit, answer.polar(domain)
         if domain.width == 2:

@@ -24,14 +24,13 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.extensions.phase_leads.model import PhaseLeadModel
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank, kinematics
-from laufruhe.machine.chambers import cylinder_gas, models_of
 from laufruhe.machine.facing import Facing
+from laufruhe.machine.gas.seiliger import seiliger_cut_off
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, lengths
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mounting import mounting_of
 from laufruhe.physics.rigid_body import ROLL
-from laufruhe.physics.seiliger_cycle import seiliger_cut_off
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure, load_rows, narrow_signal
@@ -137,7 +136,7 @@ class SharedGasBoxes:
         motored = replace(problem, points=tuple(replace(point, gas=None) for point in problem.points))
         self._model = PhaseLeadModel(motored)
         self._names = self._model.names
-        if not all(isinstance(model, Seiliger) for point in problem.points for model in models_of(point.gas)):
+        if not all(isinstance(model, Seiliger) for point in problem.points for model in point.gas_models):
             raise ModelError(
                 "an open lead angle between two cranks that share gas chambers needs the gas model seiliger"
             )
@@ -224,7 +223,7 @@ class SharedGasBoxes:
             total = np.zeros(CELLS * engine.cycle.turns)
             gas = self.problem.fidelity.gas_of(point)
             for part in engine.slider_cranks:
-                model = gas and cylinder_gas(gas, part)
+                model = gas and gas.of_cylinder(part.name)
                 if part.name in self._fixed and isinstance(model, Seiliger):
                     change = torque_change(model, part, engine.cycle, half)
                     place = math.floor(part.firing_angle / engine.cycle.angle * len(total))

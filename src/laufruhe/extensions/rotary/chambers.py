@@ -8,9 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.machine.gas.charge import chamber_volume
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.cylinder_volume import chamber_volume
-from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
@@ -42,7 +41,7 @@ def rotor_chambers(problem: Problem, part: SliderCrank, point: OperatingPoint, c
     since = [np.mod(angles - lag, turns) for lag in lags]
     values = [[chamber_volume(part, angle) for angle in since]]
     if gas is not None:
-        values.append([-thrust_at(gas, part, cycle, angle) / part.piston_area for angle in since])
+        values.append([-gas.thrust(part, cycle, angle) / part.piston_area for angle in since])
         values.append([chamber_torque(gas, part, cycle, angle) for angle in since])
     return angles, np.array(values)
 

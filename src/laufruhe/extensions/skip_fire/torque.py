@@ -23,11 +23,10 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, GasModel, OperatingPoint, SliderCrank
 from laufruhe.machine.extra import Extra, MachineTorque
+from laufruhe.machine.gas.charge import dead_centres
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.exact_angles import Turn, as_turn, star_orders
 from laufruhe.numerics.spectrum import Spectrum, common_base, spectrum_with_kinks
-from laufruhe.physics.cylinder_volume import dead_centres
-from laufruhe.physics.gas_cycle import alike_under, pressure_breaks
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -86,7 +85,7 @@ class FiringModel:
         for first in engine.cylinders:
             parts = [first, *(part for part in engine.slider_cranks if part.bore != 0.0 and first.faces(part))]
             kind = tuple(
-                (part.shaft.ratio, round(part.firing_angle - first.firing_angle, 9), alike_under(gas, part))
+                (part.shaft.ratio, round(part.firing_angle - first.firing_angle, 9), gas.alike(part))
                 for part in parts for gas in (self.fired, self.skipped)
             )  # fmt: skip
             if kind not in pulses:
@@ -114,7 +113,7 @@ class FiringModel:
             total = sum(sign * chamber_torque(gas, part, cycle, local - lag) for part, lag, gas, sign in terms)
             return np.where(since < begin + cycle.angle, total, 0.0)
 
-        breaks = np.concatenate([lag + pressure_breaks(gas, part, cycle) for part, lag, gas, _ in terms])
+        breaks = np.concatenate([lag + gas.breaks(part, cycle) for part, lag, gas, _ in terms])
         edges = begin + np.append((breaks - begin) % cycle.angle, [0.0, cycle.angle])
         return spectrum_with_kinks(torque_at, self.cycles * steps, cycle.base_order / self.cycles, edges)
 

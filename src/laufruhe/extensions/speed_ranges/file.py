@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from laufruhe.extension import extensions, missing_extension
+from laufruhe.extension import is_installed, missing_extension
 from laufruhe.extensions.speed_ranges.ranges import WORST, Curve, SpeedRange, SpeedRanges
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest, require_distinct, si_value
@@ -98,7 +98,7 @@ def _range(table: SpeedRangeTable, problem: Problem, context: ExtensionContext, 
     if not measure.is_load or "operating_points" not in measure.channel.keys:
         rule = "is no norm of a load, and has no value at each speed"
         raise Refused(f"{where}.quantity", quantity, rule, 'name one such as "rms mount force"')
-    if table.minimise and all(one.name != "worst_mean" for one in extensions()):
+    if table.minimise and not is_installed("worst_mean"):
         raise Refused(f"{where}.minimise", None, *missing_extension("worst_mean"))
     if table.minimise and (table.quantity is not None or measure.norm.name not in WORST):
         rule = (

@@ -15,22 +15,13 @@ from scipy.integrate import quad
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
-from laufruhe.machine import (
-    Chamber,
-    Chambers,
-    Compressor,
-    Cycle,
-    Engine,
-    OperatingPoint,
-    PressureTrace,
-    SliderCrank,
-    Steam,
-)
+from laufruhe.extensions.chambers.gas import Chamber, Chambers, Compressor, Steam
+from laufruhe.extensions.recorded_pressure.gas import PressureTrace
+from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
 from laufruhe.physics.bearing_loads import piston_pin_forces
 from laufruhe.physics.gas_facts import cylinder_facts
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
 from one_cylinder import gas_torque, mean_pressure_of
 
 AIR = 1.0e5
@@ -74,8 +65,8 @@ def plain_travel(degrees: float) -> float:
 def test_pressures_on_both_sides(degrees: float) -> None:
     x, is_out = plain_travel(degrees), degrees < 180.0
     angle = np.radians([degrees])
-    assert chamber_pressure(HEAD, PART, angle)[0] == pytest.approx(plain_pressure(STEAM, x, is_out), rel=1e-7)
-    assert chamber_pressure(CRANK, PART, angle)[0] == pytest.approx(plain_pressure(STEAM, 1 - x, not is_out), rel=1e-7)
+    assert HEAD.pressure(PART, angle)[0] == pytest.approx(plain_pressure(STEAM, x, is_out), rel=1e-7)
+    assert CRANK.pressure(PART, angle)[0] == pytest.approx(plain_pressure(STEAM, 1 - x, not is_out), rel=1e-7)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.2])
@@ -112,10 +103,10 @@ def test_orders_follow_the_torque_point_by_point() -> None:
 
 def test_a_trace_of_the_diagram_is_the_diagram() -> None:
     angles = np.linspace(0.0, math.tau, 20001)[:-1]
-    trace = PressureTrace(tuple(angles), tuple(chamber_pressure(HEAD, PART, angles)))
+    trace = PressureTrace(tuple(angles), tuple(HEAD.pressure(PART, angles)))
     traced = replace(HEAD, diagram=trace)
     at = np.radians([1.0, 20.0, 77.0, 140.0, 250.0, 340.0])
-    assert chamber_pressure(traced, PART, at) == pytest.approx(chamber_pressure(HEAD, PART, at), rel=1e-5)
+    assert traced.pressure(PART, at) == pytest.approx(HEAD.pressure(PART, at), rel=1e-5)
 
 
 def test_ends_of_a_scotch_yoke_are_images() -> None:
@@ -131,7 +122,7 @@ def test_ends_of_a_scotch_yoke_are_images() -> None:
 def test_pressure_stays_between_its_ends(cut_off: float, release: float, compression: float, clearance: float) -> None:
     diagram = Steam(8e5, 1e5, cut_off, cut_off + (1 - cut_off) * release, compression, 0.5 * compression, clearance)
     chamber = replace(HEAD, diagram=diagram)
-    pressures = chamber_pressure(chamber, PART, np.linspace(0.0, math.tau, 500))
+    pressures = chamber.pressure(PART, np.linspace(0.0, math.tau, 500))
     squeezed = 1e5 * (compression + clearance) / (0.5 * compression + clearance)
     expanded = 8e5 * (cut_off + clearance) / (diagram.release + clearance)
     assert pressures.min() >= 0.999 * min(1e5, expanded)
@@ -150,7 +141,7 @@ def test_chambers_act_on_their_cylinders_alone() -> None:
     point = OperatingPoint("run", 10.0, DOUBLE)
     forces = piston_pin_forces(engine(PART, second), point).values(np.radians([40.0]))[0, :, 0]
     inertia = piston_pin_forces(engine(PART, second), replace(point, gas=None)).values(np.radians([40.0]))[0, :, 0]
-    thrust = chambers_thrust(DOUBLE, PART, np.radians([40.0]))[0]
+    thrust = DOUBLE.thrust(PART, Cycle.TWO_STROKE, np.radians([40.0]))[0]
     assert forces - inertia == pytest.approx([thrust, 0.0], rel=1e-6, abs=1e-6)
 
 
@@ -254,7 +245,7 @@ def test_a_compressor_point_by_point() -> None:
         x, is_out = plain_travel(degrees), degrees < 180.0
         expanded, squeezed = 7e5 * (c / (x + c)) ** n, 1.2e5 * ((1 + c) / (x + c)) ** n
         expected = max(expanded, 1.2e5) if is_out else min(squeezed, 7e5)
-        assert chamber_pressure(chamber, PART, np.radians([degrees]))[0] == pytest.approx(expected, rel=1e-7)
+        assert chamber.pressure(PART, np.radians([degrees]))[0] == pytest.approx(expected, rel=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from laufruhe.extensions.advice.compressor_stages import Stage, links_of, matched_pressures
+from laufruhe.extensions.chambers.stages import Stage, links_of, matched_pressures
 from laufruhe.present.gas_figures import gas_note
 from problem_files import PROBLEMS, loaded
 

@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from laufruhe.extensions.indicator_diagrams.diagram import indicator_of, points_with_chambers
-from laufruhe.machine import Chambers, OperatingPoint, SliderCrank
-from laufruhe.physics.cylinder_volume import dead_centres
+from laufruhe.extensions.chambers.diagram import indicator_of, points_with_chambers
+from laufruhe.extensions.chambers.gas import Chambers
+from laufruhe.machine import OperatingPoint, SliderCrank
+from laufruhe.machine.gas.charge import dead_centres
 from laufruhe.plots.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, entry, finish_page, page, styled
 from laufruhe.plots.words import FAINT, INK
 from laufruhe.solvers.result import Result

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.machine import CRANKSHAFT, Chamber, Chambers, Pump, SliderCrank, Steam
+from laufruhe.extensions.chambers.gas import Chamber, Chambers, Pump, Steam
+from laufruhe.machine import CRANKSHAFT, Cycle, SliderCrank
 from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.physics.torque import torque_facts
-from laufruhe.physics.working_chambers import chambers_thrust
 from laufruhe.problem.problem import Problem
 from one_cylinder import mean_pressure_of
 from problem_files import PROBLEMS
@@ -48,7 +48,7 @@ def test_pump_forces(engine: Problem, degrees: float, printed: float) -> None:
     """
     pumps = tuple(chamber for name, chamber in _chambers(engine).items() if name.startswith("pumps"))
     part = engine.engine.slider_cranks[0]
-    thrust = chambers_thrust(Chambers(pumps, AT), part, np.radians([degrees]))[0]
+    thrust = Chambers(pumps, AT).thrust(part, Cycle.TWO_STROKE, np.radians([degrees]))[0]
     away_from_crank = 1.0 if degrees < 180.0 else -1.0
     assert away_from_crank * thrust / KILOPOND == pytest.approx(printed, abs=6.0)
 
@@ -73,7 +73,7 @@ def test_mean_area_for_both_sides() -> None:
     def force(rods: tuple[float, float]) -> float:
         head = Chamber("1", ("one",), "head", 0.45, rods[0], steam)
         crank = Chamber("2", ("one",), "crank", 0.45, rods[1], exhaust)
-        return -float(chambers_thrust(Chambers((head, crank), AT), part, np.array([1.0]))[0]) / KILOPOND
+        return -float(Chambers((head, crank), AT).thrust(part, Cycle.TWO_STROKE, np.array([1.0]))[0]) / KILOPOND
 
     exact = force((0.075, 0.10))
     assert exact == pytest.approx(7.0 * 1546.3 - 0.4 * 1511.9, abs=0.5)

@@ -1,4 +1,4 @@
-"""Measured pressure trace, made periodic without ringing, and the noise on it."""
+"""Measured cycle, made periodic without ringing, and the noise on it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, PressureTrace
+from laufruhe.machine import Cycle
 from laufruhe.numerics.arrays import Array
 
 MAX_TRACE_GAP = math.radians(30.0)
@@ -24,17 +24,12 @@ _POWER = 6
 """Exponent of the order in the penalty: that of the third derivative."""
 
 
-def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: Array, pace: float = 1.0) -> Array:
-    """Return the measured pressure [Pa] at crank angles gamma [rad], repeated every cycle over `pace` (G12).
+def periodic_cubics(points: Array, heights: Array, cycle: Cycle, angles: Array, pace: float = 1.0) -> Array:
+    """Return values at crank angles [rad] from the heights at points of one cycle over `pace`, repeated (G12).
 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
     neighbours: a jump does not ring.
     """
-    return periodic_cubics(np.array(gas.angles), np.array(gas.pressures), cycle, angles, pace)
-
-
-def periodic_cubics(points: Array, heights: Array, cycle: Cycle, angles: Array, pace: float = 1.0) -> Array:
-    """Return values at crank angles [rad] from the heights at points of one cycle over `pace` (G12)."""
     # imported late, as it takes longer than all the rest of a small problem
     from scipy.interpolate import PchipInterpolator
 
@@ -45,21 +40,6 @@ def periodic_cubics(points: Array, heights: Array, cycle: Cycle, angles: Array, 
     values = np.concatenate([heights[-3:], heights, heights[:3]])
     local = points[0] + np.mod(angles - points[0], period)
     return np.asarray(PchipInterpolator(around, values)(local))
-
-
-def peak_angle(angles: Array, pressures: Array) -> float:
-    """Return the angle of the largest pressure [rad]: the top of a parabola through three points."""
-    k = int(np.argmax(pressures))
-    if 0 < k < len(angles) - 1 and pressures[k] > max(pressures[k - 1], pressures[k + 1]):
-        steps = angles[k - 1 : k + 2] - angles[k]
-        second, first, _ = np.polyfit(steps, pressures[k - 1 : k + 2] - pressures[k], 2)
-        return float(angles[k] - 0.5 * first / second)
-    return float(angles[k])
-
-
-def bottom_pressure(angles: Array, pressures: Array, period: float) -> float:
-    """Return the pressure half a turn before firing [Pa]."""
-    return float(np.interp(-math.pi, angles, pressures, period=period))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from laufruhe.machine import Chambers, Compressor
-from laufruhe.machine.chambers import GasModel, models_of, suction_point
+from laufruhe.extensions.chambers.gas import Chambers, Compressor, suction_point
+from laufruhe.machine import GasModel
 from laufruhe.present.numbers import share, trimmed
 from laufruhe.problem.advice import Advice
 from laufruhe.problem.problem import Problem
@@ -116,12 +116,12 @@ def _matched(link: Link) -> float | None:
 
 def _sentences(problem: Problem) -> list[str]:
     gases = dict.fromkeys(problem.fidelity.gas_of(point) for point in problem.points)
-    return [sentence for gas in gases for sentence in _of_gas(problem, gas)]
+    return [sentence for gas in gases if gas for sentence in _of_gas(problem, gas)]
 
 
-def _of_gas(problem: Problem, gas: GasModel | None) -> list[str]:
+def _of_gas(problem: Problem, gas: GasModel) -> list[str]:
     """Return what each stage takes in, and what one delivers more or less than the next takes in."""
-    models = (model for model in models_of(gas) if isinstance(model, Chambers))
+    models = (model for model in gas.models if isinstance(model, Chambers))
     chambers = [(chamber, chamber.diagram) for model in models for chamber in model.chambers]
     stages = [
         Stage(

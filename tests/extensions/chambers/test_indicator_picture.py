@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.extensions.indicator_diagrams import picture as indicator
-from laufruhe.machine import Chambers, Steam
+from laufruhe.extensions.chambers import picture as indicator
+from laufruhe.extensions.chambers.gas import Chambers, Steam
 from laufruhe.plots.results import cycle, engine
 from laufruhe.solvers import Result
 from one_cylinder import mean_pressure_of

@@ -1,22 +1,24 @@
-"""Working chambers on both sides of a piston, and of further pistons on its rod: steam, pumps, traces."""
+"""Working chambers on both sides of a piston, and of further pistons on its rod: steam, pumps, traces (G14-G17).
+
+A diagram is over the piston's travel x from the dead centre at which its chamber is smallest, once on
+the way out and once on the way back; what its pressure is over that of the air around drives the rod.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import TypeAlias
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.gas import (
-    AMBIENT_PRESSURE,
-    PressureTrace,
-    Seiliger,
-    TrappedCharge,
-    Wiebe,
-    check_pressures,
-)
-from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.machine.gas.base import AMBIENT_PRESSURE, GasModel, OneChamber, check_pressures
+from laufruhe.machine.gas.charge import JUMP_WIDTH, dead_centres, swept_volume
+from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.roots import rising_root
 
 ENDS: Mapping[str, int] = {"head": 1, "crank": -1}
 """Ends of a cylinder, and direction in which the pressure there drives the piston: 1 towards the crank."""
@@ -133,7 +135,7 @@ class Chamber:
     end: str
     bore: float
     rod: float
-    diagram: Steam | PressureTrace
+    diagram: Steam | OneChamber
 
     def __post_init__(self) -> None:
         if self.end not in ENDS:
@@ -158,13 +160,55 @@ class Chamber:
         """Sign of the force: 1 towards the crank, else -1."""
         return ENDS[self.end]
 
+    def travel(self, part: SliderCrank, angles: Array) -> Array:
+        """Return the travel from where the chamber is smallest, as part of the stroke."""
+        swept = np.clip(swept_volume(part, angles), 0.0, 1.0)
+        return swept if self.side > 0 else 1.0 - swept
+
+    def pressure(self, part: SliderCrank, angles: Array) -> Array:
+        """Return the absolute pressure [Pa], at a jump the mean of both sides, shape of `angles`."""
+
+        def at(angles: Array) -> Array:
+            smallest, largest = self.ends(part)
+            local = np.mod(angles - smallest, math.tau)
+            if not isinstance(self.diagram, Steam):
+                return self.diagram.cycle_pressure(part, Cycle.TWO_STROKE, local, 1.0)
+            return _steam(self.diagram, self.travel(part, angles), local < largest - smallest)
+
+        return 0.5 * (at(angles - JUMP_WIDTH) + at(angles + JUMP_WIDTH))
+
+    def ends(self, part: SliderCrank) -> tuple[float, float]:
+        """Return the angles at which the chamber is smallest, and largest after that [rad]."""
+        top, bottom = dead_centres(part)
+        return (top, bottom) if self.side > 0 else (bottom, top + math.tau)
+
+    def breaks(self, part: SliderCrank) -> set[float]:
+        """Return the angles at which a derivative of the pressure jumps [rad]."""
+        smallest, largest = self.ends(part)
+        diagram = self.diagram
+        if not isinstance(diagram, Steam):
+            return {smallest + angle for angle in diagram.cycle_breaks(part, Cycle.TWO_STROKE, 1.0).tolist()}
+
+        def at(place: float, begin: float) -> float:
+            # the travel rises from where the chamber is smallest, forwards or backwards
+            way = largest - begin
+            return begin + way * rising_root(
+                lambda share: float(self.travel(part, np.asarray(begin + share * way))) - place, 0.0, 1.0
+            )
+
+        kinks = [(place, smallest) for place in (diagram.cut_off, diagram.release)]
+        kinks += [(place, smallest + math.tau) for place in (diagram.compression, diagram.lead)]
+        return {smallest, largest, *(at(place, begin) for place, begin in kinks if 0.0 < place < 1.0)}
+
 
 @dataclass(frozen=True)
-class Chambers:
+class Chambers(GasModel):
     """Working chambers of a machine, and the pressure of the air around, on the ends of the piston rods [Pa]."""
 
     chambers: tuple[Chamber, ...]
     crankcase_pressure: float = AMBIENT_PRESSURE
+
+    fires: ClassVar = False
 
     def __post_init__(self) -> None:
         check_pressures(self, "crankcase_pressure")
@@ -175,36 +219,61 @@ class Chambers:
         """Return the chambers on the rod of a slider-crank."""
         return tuple(chamber for chamber in self.chambers if part.name in chamber.cylinders)
 
+    def only(self, name: str, /) -> Chambers | None:
+        """Return the chambers of this cylinder alone."""
+        chambers = [replace(chamber, cylinders=(name,)) for chamber in self.chambers if name in chamber.cylinders]
+        return replace(self, chambers=tuple(chambers)) if chambers else None
 
-CommonGas: TypeAlias = Seiliger | Wiebe | PressureTrace | TrappedCharge | Chambers
+    def shares(self, engine: Engine) -> list[tuple[str, GasModel, Sequence[SliderCrank]]]:
+        """Return every chamber with its slider-cranks."""
+        parts = engine.slider_cranks
+        return [(c.name, replace(self, chambers=(c,)), [p for p in parts if p.name in c.cylinders])
+                for c in self.chambers]  # fmt: skip
+
+    def pressure(self, part: SliderCrank, _cycle: Cycle, angles: Array, /) -> Array:
+        """Return the pressure of the only chamber of a rod [Pa]."""
+        if len(chambers := self.of(part)) != 1:
+            raise ModelError(f"{part.name} has several chambers, which have a pressure each")
+        return chambers[0].pressure(part, angles)
+
+    def thrust(self, part: SliderCrank, _cycle: Cycle, angles: Array, /) -> Array:
+        """Return P = -sum of +-F (p - p_0) along the axis of a cylinder, away from the crank [N] (G14; eq. 296)."""
+        total = np.zeros(np.shape(angles))
+        for chamber in self.of(part):
+            total -= chamber.side * chamber.area * (chamber.pressure(part, angles) - self.crankcase_pressure)
+        return total
+
+    def breaks(self, part: SliderCrank, cycle: Cycle) -> Array:
+        """Return the angles at which a derivative of a pressure jumps [rad]."""
+        breaks = sorted(set[float]().union(*(chamber.breaks(part) for chamber in self.of(part))))
+        return np.ravel(np.array(breaks)[:, None] + math.tau * np.arange(cycle.turns))
+
+    def alike(self, part: SliderCrank) -> Hashable:
+        """Return a key that is equal for rods with equal paths and chambers."""
+        return part.path, part.facing, tuple((c.end, c.bore, c.rod, c.diagram) for c in self.of(part))
+
+    def swept_volume(self, part: SliderCrank) -> float:
+        """Return the volume that the chambers of a rod sweep [m3]."""
+        return sum(chamber.area * part.stroke for chamber in self.of(part))
 
 
-@dataclass(frozen=True)
-class CylinderGases:
-    """Gas of an engine whose cylinders differ: the common model, and models of single cylinders by their names."""
-
-    common: CommonGas
-    single: tuple[tuple[str, CommonGas], ...]
-
-    def of_cylinder(self, name: str) -> CommonGas:
-        """Return the gas model of a cylinder."""
-        return dict(self.single).get(name, self.common)
-
-    def mapped(self, change: Callable[[CommonGas], CommonGas]) -> CylinderGases:
-        """Return the gas with every model changed."""
-        return CylinderGases(change(self.common), tuple((name, change(gas)) for name, gas in self.single))
-
-
-GasModel: TypeAlias = CommonGas | CylinderGases
+def _steam(diagram: Steam, travel: Array, out: Mask) -> Array:
+    """Return the pressure of admission, expansion and release, then of exhaust, compression and lead (G15)."""
+    released = _expanded(diagram, diagram.admission, diagram.cut_off, np.asarray(diagram.release))
+    squeezed = _expanded(diagram, diagram.back_pressure, diagram.compression, np.asarray(diagram.lead))
+    way = (travel - diagram.release) / (1.0 - diagram.release if diagram.release < 1.0 else 1.0)
+    falling = released + np.maximum(way, 0.0) * (diagram.back_pressure - released)
+    opening = np.maximum(diagram.lead - travel, 0.0) / (diagram.lead if diagram.lead > 0.0 else 1.0)
+    rising = squeezed + opening * (diagram.admission - squeezed)
+    behind_cut_off = np.clip(travel, diagram.cut_off, diagram.release)
+    expanding = _expanded(diagram, diagram.admission, diagram.cut_off, behind_cut_off)
+    closed = np.clip(travel, diagram.lead, diagram.compression)
+    squeezing = _expanded(diagram, diagram.back_pressure, diagram.compression, closed)
+    on_way_out = np.where(travel <= diagram.release, expanding, falling)
+    return np.where(out, on_way_out, np.where(travel >= diagram.lead, squeezing, rising))
 
 
-def cylinder_gas(gas: GasModel, part: SliderCrank) -> CommonGas:
-    """Return the gas model of a cylinder."""
-    return gas.of_cylinder(part.name) if isinstance(gas, CylinderGases) else gas
-
-
-def models_of(gas: GasModel | None) -> tuple[CommonGas, ...]:
-    """Return the gas models of all cylinders, each once."""
-    if isinstance(gas, CylinderGases):
-        return tuple(dict.fromkeys((gas.common, *(model for _, model in gas.single))))
-    return () if gas is None else (gas,)
+def _expanded(diagram: Steam, pressure: float, begin: float, end: Array) -> Array:
+    volume = end + diagram.clearance
+    shrinking = np.where(volume > 0.0, (begin + diagram.clearance) / np.where(volume > 0.0, volume, 1.0), 1.0)
+    return np.asarray(pressure * shrinking**diagram.exponent)

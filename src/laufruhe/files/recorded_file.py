@@ -17,9 +17,9 @@ from laufruhe.files.complaints import Refused, errors_at_key, nearest, si_value
 from laufruhe.files.csv_rows import table_of
 from laufruhe.files.fields import Table
 from laufruhe.files.number_tables import NumberTable, Unit, unit_in
-from laufruhe.machine import Cycle, PressureTrace
+from laufruhe.machine import Cycle
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.pressure_trace import bottom_pressure, peak_angle, smooth_cycle
+from laufruhe.physics.measured_cycle import smooth_cycle
 from laufruhe.units import quantity_text
 
 _ANGLE_NAME = re.compile(r"angle|winkel|^(?:ca|kw|cad|theta|phi|alpha|gamma)\b", re.IGNORECASE)
@@ -29,8 +29,7 @@ _OTHER_NAME = re.compile(
     re.IGNORECASE,
 )
 """Heading of a column that is no cycle with combustion: computed from several cycles, or motored."""
-_GAUGE_NAME = re.compile(r"gauge|überdruck|ueberdruck", re.IGNORECASE)
-_ALIKE = 0.9
+ALIKE = 0.9
 """Least correlation of columns that are cycles of one cylinder."""
 _UNLIKE, _MANY = 0.7, 0.2
 """Correlation with the mean below which a cycle is unlike the others, and the largest share of such cycles."""
@@ -45,11 +44,6 @@ _SCATTER = 0.25
 """Standard deviation over the mean of the peaks from which columns may be no cycles of one cylinder."""
 _WHOLE = 0.95
 """Least share of the points of the longest cycle that a cycle has."""
-NEAR_FIRING = math.radians(60.0)
-"""Largest angle between the peak pressure and its dead centre at which the peak tells which dead centre it is."""
-_PEG_WIDTH = math.radians(5.0)
-"""Angle to either side over which the pressure is averaged to be pegged."""
-_EXCHANGE = "gas exchange"
 
 
 def _column(raw: Any) -> str | int:
@@ -74,15 +68,6 @@ CyclesChoice: TypeAlias = Annotated[
     PlainValidator(_cycles_of_key),
     WithJsonSchema({"anyOf": [{"enum": ["mean", "worst"]}, {"type": "integer", "minimum": 1}]}),
 ]
-
-
-class PegTable(Table):
-    """Known pressure at an angle, to which a floating pressure is moved."""
-
-    at: f.Angle = f.required("Crank angle after the firing dead centre; the mean of 5 degrees to either side counts.")
-    to: f.PositivePressure = f.required(
-        "Absolute pressure there, such as that in the intake at its bottom dead centre."
-    )
 
 
 @dataclass(frozen=True)
@@ -113,12 +98,6 @@ class Quantity:
         return quantity_text(self.factor * value, self.unit, digits)
 
 
-PRESSURE = Quantity(
-    "pressure", "Pa", "bar", 1e-5, "pressure of the cylinder",
-    re.compile(r"^(?:p|p?[ _]?(?:cyl|zyl)[a-z]*[ ._-]*)\d+\s*(?:[\[(/].*)?$", re.IGNORECASE),
-)  # fmt: skip
-
-
 class OverAngleTable(Table):
     """A quantity over the crank angle, as test benches and simulations write it: a text, .xlsx or .mat file."""
 
@@ -132,19 +111,6 @@ class OverAngleTable(Table):
         "Of several cycles: their mean, the one with the highest peak, or that with this number.", "mean"
     )
     smooth: bool = f.optional("false keeps the noise of the measurement.", True)
-
-
-class RecordedTable(OverAngleTable):
-    """A recorded trace of pressure."""
-
-    records = PRESSURE
-
-    pressure_column: Annotated[list[Column], f.ListOrSingle(Column)] | None = f.optional(
-        "Name or number of the column of pressures, or several that are cycles of the cylinder."
-    )
-    pressure_unit: str | None = f.optional("Unit of the pressures, if it is not in the file; bar by default.")
-    gauge: bool | None = f.optional("true: pressures count from crankcase_pressure. By default they are absolute.")
-    peg: PegTable | None = f.optional("Moves a floating pressure to a known one, at one angle.")
 
 
 class RecordedFile:
@@ -241,7 +207,7 @@ class RecordedFile:
         if max(ranges.values()) > _LARGER * ranges[first]:
             names = ", ".join(map(self.name, columns))
             raise self.refused(f"may have the {self.records.what} in {names}", f"name one by {key}")
-        alike = [k for k in columns if k == first or _correlation(values[:, first], values[:, k]) > _ALIKE]
+        alike = [k for k in columns if k == first or correlation(values[:, first], values[:, k]) > ALIKE]
         heading = self.records.cylinder_heading
         cylinders = [k for k in columns if heading and heading.search(self.numbers.names[k])]
         if len(set(alike) & set(cylinders)) > 1:
@@ -287,20 +253,6 @@ class RecordedFile:
         return self.values[:, column]
 
 
-def _absolute(file: RecordedFile, table: RecordedTable, air: float) -> Array:
-    """Return the pressures of all rows and columns [Pa]; `air` is added to those of a gauge."""
-    pressures, unit = file.read()
-    is_gauge = table.gauge
-    if is_gauge is None and table.peg is None:
-        heading = file.numbers.names[file.columns[0]]
-        is_gauge = bool((unit and unit.is_gauge) or _GAUGE_NAME.search(heading))
-    if is_gauge and table.peg is not None:
-        raise file.refused("is given beside peg, which finds the zero of the pressure", "keep one", "gauge")
-    if is_gauge:
-        file.said.append(f"Pressures are those of a gauge, in air of {1e-5 * air:.6g} bar.")
-    return pressures + (air if is_gauge else 0.0)
-
-
 def smooth_values(
     file: RecordedFile, angles: Array, values: Array, cycle: Cycle, pace: float
 ) -> tuple[Array, Array]:  # fmt: skip
@@ -316,51 +268,6 @@ def smooth_values(
     if smooth.noise > _ROUNDING * np.ptp(chosen):
         file.said.append(f"Noise: {file.records.text(smooth.noise, 2)} rms, {treatment}.")
     return angles, chosen
-
-
-def recorded_trace(
-    table: RecordedTable, folder: Path, where: str, cycle: Cycle, pace: float, air: float, zero: str | float | None,
-    later: float = 0.0,
-) -> PressureTrace:  # fmt: skip
-    """Return the trace of a recorded file in the folder of a problem, over one cycle over `pace`, without its noise.
-
-    `air` is the pressure around [Pa]. `zero` is the crank angle after firing at which the file counts zero [rad], or
-    the name of this dead centre; None leaves it to the peak of the pressure. The file counts from a cylinder that fires
-    `later` [rad] earlier than that of the trace.
-    """
-    file = RecordedFile(table, folder, where)
-    period = cycle.angle / pace
-    angles, pressures = smooth_values(file, file.angles(), _absolute(file, table, air), cycle, pace)
-    # one turn of a four-stroke has the burn, the other one the gas exchange
-    other = np.interp(angles + 0.5 * period, angles, pressures, period=period)
-    if cycle is Cycle.FOUR_STROKE and _correlation(pressures, other) > _ALIKE:
-        rule = "has the same pressures in both turns of its four-stroke cycle"
-        raise file.refused(rule, "check engine.cycle, or record the gas exchange too")
-    exchange = 0.5 * period if cycle is Cycle.FOUR_STROKE else 0.0
-    angles = angles - later
-    start = _zero(file, angles, pressures, zero, exchange, period)
-    angles = angles + start
-    if later:
-        # the end of a cycle may repeat the beginning
-        last = len(angles) - int(angles[-1] - angles[0] > period * (1.0 - 1e-9))
-        angles = np.mod(angles[:last] + 0.5 * period, period) - 0.5 * period
-        order = np.argsort(angles)
-        angles, pressures = angles[order], pressures[:last][order]
-    if table.peg is not None:
-        since = np.mod(angles - table.peg.at + math.pi, period) - math.pi
-        rise = table.peg.to - float(np.mean(pressures[np.abs(since) <= max(_PEG_WIDTH, float(np.abs(since).min()))]))
-        pressures = pressures + rise
-        at = math.degrees(table.peg.at)
-        moved = f"{PRESSURE.text(rise)}, to {PRESSURE.text(table.peg.to)}"
-        file.said.append(f"Pressures are moved by {moved} at {at:.6g} deg.")
-    if pressures.min() <= 0.0:
-        rule = f"has pressures down to {PRESSURE.text(pressures.min())}, which are not absolute"
-        raise file.refused(rule, 'write gauge = true, or peg = { at = "-180 deg", to = "1 bar" } with what is known')
-    if pace == 1.0:
-        bottom = PRESSURE.text(bottom_pressure(angles, pressures, period))
-        file.said.append(f"Pressure at the bottom dead centre before compression: {bottom}.")
-    with errors_at_key(f"{where}.file", table.file):
-        return PressureTrace(tuple(angles.tolist()), tuple(pressures.tolist()), air, tuple(file.said))
 
 
 def _finite(values: Array) -> Array:
@@ -385,7 +292,8 @@ def _turns(values: Array) -> float:
     return math.tau if turns > 0.9 and abs(turns - round(turns)) * math.tau < 1.5 * step else 0.0
 
 
-def _correlation(first: Array, other: Array) -> float:
+def correlation(first: Array, other: Array) -> float:
+    """Return the correlation of two columns."""
     deviations = [np.nan_to_num(column - np.nanmean(column)) for column in (first, other)]
     lengths = math.prod(float(np.linalg.norm(deviation)) for deviation in deviations)
     return float(deviations[0] @ deviations[1]) / lengths if lengths > 0.0 else 0.0
@@ -440,7 +348,7 @@ def _chosen(file: RecordedFile, cycles: Array) -> Array:
             raise file.refused("is not in the file, which has one cycle", "leave it out", "cycles")
         return np.asarray(cycles[0])
     mean = np.asarray(cycles.mean(axis=0))
-    unlike = sum(_correlation(mean, cycle) < _UNLIKE for cycle in cycles)
+    unlike = sum(correlation(mean, cycle) < _UNLIKE for cycle in cycles)
     if unlike > _MANY * count:
         rule = f"has {counted(count, 'cycle')} that differ, and {unlike} of them are unlike their mean"
         raise file.refused(rule, f"check engine.cycle, or name one by {file.records.name}_column or cycles")
@@ -456,23 +364,3 @@ def _chosen(file: RecordedFile, cycles: Array) -> Array:
     k = int(peaks.argmax()) if choice == "worst" else int(choice) - 1
     file.said.append(f"{which}, number {k + 1} is used.")
     return np.asarray(cycles[k])
-
-
-def _zero(
-    file: RecordedFile, angles: Array, pressures: Array, zero: str | float | None, exchange: float, period: float
-) -> float:  # fmt: skip
-    """Return the crank angle after firing at which the file counts zero; `exchange` is that of gas exchange [rad]."""
-    if isinstance(zero, float):
-        return zero
-    if zero is not None:
-        return exchange if zero == _EXCHANGE else 0.0
-    peak = float(angles[int(np.argmax(pressures))])
-    opposite = np.abs(np.remainder(angles - peak - exchange + 0.5 * period, period) - 0.5 * period) < NEAR_FIRING
-    rise = pressures - pressures.min()
-    is_near = abs(math.remainder(peak - exchange, period)) < NEAR_FIRING
-    is_exchange = bool(exchange) and is_near and rise.max() > 2.0 * rise[opposite].max(initial=0.0)
-    start = exchange if is_exchange else 0.0
-    place = math.degrees(math.remainder(peak_angle(angles, pressures) + start, period))
-    dead_centre = f"0 deg of the file is taken as the {_EXCHANGE if is_exchange else 'firing'} dead centre"
-    file.said.append(f"{dead_centre}; the peak then lies {place:.4g} deg after firing.")
-    return start

@@ -1,4 +1,4 @@
-"""Volume, indicated work and valve events of one cylinder over its cycle (G1-G4).
+"""Volume of one cylinder over its cycle, charge and valve events of a computed one (G1-G3, G6, G21).
 
 Volumes are in displacements, v = V / V_h, so that no bore enters. Angles gamma count
 from the firing dead centre of the cylinder, alpha = 0 (C5), in the direction in which
@@ -18,10 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Charge, Cycle, SliderCrank, TrappedCharge
+from laufruhe.machine.engine import Cycle
+from laufruhe.machine.gas.base import AMBIENT_PRESSURE, OneChamber, check_pressures
+from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.numerics.arrays import Array
 
 JUMP_WIDTH = 1e-11
+MAX_COMPRESSION_RATIO = 1000.0
+"""Largest compression ratio that gas models accept."""
 
 
 def swept_volume(part: SliderCrank, angles: Array) -> Array:
@@ -46,6 +50,12 @@ def dead_centres(part: SliderCrank) -> tuple[float, float]:
     return top, bottom % math.tau
 
 
+def stroke_ends(part: SliderCrank) -> tuple[float, ...]:
+    """Return the dead centres of a cycle, where valves open and heat comes at once [rad] (G13)."""
+    top, bottom = dead_centres(part)
+    return bottom - math.tau, top, bottom, top + math.tau
+
+
 def _ratio(part: SliderCrank) -> float:
     ratio = part.shaft.ratio
     if abs(ratio) != 1.0:
@@ -54,6 +64,43 @@ def _ratio(part: SliderCrank) -> float:
             "the ratio must be 1 or -1; give a pressure trace"
         )
     return ratio
+
+
+@dataclass(frozen=True, kw_only=True)
+class Charge(OneChamber):
+    """Charge and gas exchange of a computed cycle.
+
+    Attributes
+    ----------
+    compression_ratio
+        Largest over smallest volume.
+    intake_pressure, exhaust_pressure
+        Absolute pressures of the gas exchange [Pa]; compression starts at the first. A two-stroke
+        needs no exhaust pressure.
+    crankcase_pressure
+        Absolute pressure on the underside of the piston [Pa].
+    """
+
+    compression_ratio: float = 17.0
+    intake_pressure: float = AMBIENT_PRESSURE
+    exhaust_pressure: float = AMBIENT_PRESSURE
+    crankcase_pressure: float = AMBIENT_PRESSURE
+
+    def __post_init__(self) -> None:
+        check_pressures(self, "intake_pressure", "exhaust_pressure", "crankcase_pressure")
+        if not 1.0 < self.compression_ratio <= MAX_COMPRESSION_RATIO:
+            raise ModelError(
+                f"compression_ratio {self.compression_ratio:g} must be over 1 and at most {MAX_COMPRESSION_RATIO:g}; "
+                "give the largest over the smallest volume"
+            )
+
+    def check(self, part: SliderCrank, /) -> None:
+        """Refuse a compression ratio that the shape of a chamber does not allow (Y2)."""
+        if self.compression_ratio > part.largest_ratio:
+            raise ModelError(
+                f"{self.compression_ratio:g} leaves {part.name} no chamber, whose shape allows "
+                f"{part.largest_ratio:.4g} at most; reduce the compression ratio, or the eccentricity"
+            )
 
 
 @dataclass(frozen=True)
@@ -108,10 +155,30 @@ class ChargedCylinder:
         return pressures
 
 
-def trapped_pressure(gas: TrappedCharge, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
-    """Return the pressure [Pa] of a charge that no valve lets out, at crank angles gamma [rad] (G21)."""
-    cylinder = ChargedCylinder(gas, part, cycle)
-    return np.asarray(gas.intake_pressure * (cylinder.largest / cylinder.volume(angles)) ** gas.exponent)
+@dataclass(frozen=True)
+class TrappedCharge(Charge):
+    """Charge of a cut cylinder, whose valves do not move: p V^n is constant from the largest volume on (G21).
+
+    Attributes
+    ----------
+    exponent
+        Polytropic exponent n; zero if the valves stay open, so that the pressure is that of the intake.
+    """
+
+    exponent: float
+
+    def motored(self, _cycle: Cycle, /) -> TrappedCharge:
+        """Return this charge, which does not burn."""
+        return self
+
+    def cycle_pressure(self, piston: SliderCrank, cycle: Cycle, angles: Array, pace: float) -> Array:
+        """Return the pressure of a charge that no valve lets out [Pa] (G21)."""
+        cylinder = ChargedCylinder(self, piston, cycle)
+        return np.asarray(self.intake_pressure * (cylinder.largest / cylinder.volume(pace * angles)) ** self.exponent)
+
+    def cycle_breaks(self, _piston: SliderCrank, _cycle: Cycle, _pace: float, /) -> Array:
+        """Return no angle, as the pressure has no kink."""
+        return np.zeros(0)
 
 
 def gas_exchange_pressure(gas: Charge, cycle: Cycle) -> float:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.machine import Chambers, OperatingPoint, SliderCrank
+from laufruhe.extensions.chambers.gas import Chambers
+from laufruhe.machine import Cycle, OperatingPoint, SliderCrank
+from laufruhe.machine.gas.charge import swept_volume
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.cylinder_volume import swept_volume
-from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
 from laufruhe.present.measures import has_loads
 from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
@@ -21,7 +21,7 @@ from laufruhe.solvers.result import Result
 PICTURE = ResultPicture(
     "indicator",
     "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
-    "laufruhe.extensions.indicator_diagrams.picture",
+    "laufruhe.extensions.chambers.picture",
 )
 _TURN = math.tau * np.arange(STEPS) / STEPS
 
@@ -52,8 +52,8 @@ def indicator_of(gas: Chambers, part: SliderCrank, point: OperatingPoint, angles
     mass, (_, _, acceleration) = part.motion(np, part.fires_at + part.shaft.ratio * angles).points[0]
     return Indicator(
         swept_volume(part, angles),
-        {chamber.name: chamber_pressure(chamber, part, angles) for chamber in gas.of(part)},
-        -chambers_thrust(gas, part, angles),
+        {chamber.name: chamber.pressure(part, angles) for chamber in gas.of(part)},
+        -gas.thrust(part, Cycle.TWO_STROKE, angles),
         np.asarray(-mass * (part.shaft.ratio * point.speed) ** 2 * acceleration.real),
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.machine import Chamber, Chambers, Pump, Steam
+from laufruhe.extensions.chambers.gas import Chamber, Chambers, Pump, Steam
 from laufruhe.physics.shaking_loads import shaking_loads
 from problem_files import PROBLEMS
 from validation import multibody

@@ -1,0 +1,1 @@
+"""Models of the working gas, a file for each."""
