@@ -17,7 +17,8 @@ from lanes import first_fast
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load
 from laufruhe.load_models import uneven_model
-from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.load_models.uneven_model import UnevenModel
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -74,9 +75,10 @@ def _roll_of_star(fidelity: Fidelity) -> dict[float, complex]:
     problem = load(PROBLEMS / "inline-five-uneven-gas.toml").at(fidelity)
     assert problem.phasing is not None
     throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
-    star = problem.phasing.problem_of(Candidate(throws, (1, 2, 4, 5, 3)))
-    symbols = UnevenSymbols([ca.DM(angle) for angle in throws], None, None, ca.DM(0, 1))
-    lines = UnevenModel(star, problem.phasing.layout(None, None), {}, symbols).wrench(star.points[0])
+    start = Candidate(throws, (1, 2, 4, 5, 3))
+    star = problem.phasing.problem_of(start)
+    moves = ThrowMoves(problem.phasing, problem.phasing.layout(None, None), start, problem.phasing.intervals)
+    lines = UnevenModel(star, moves, ca.DM.zeros(moves.size), ca.DM(0, 1)).wrench(star.points[0])
     real, imaginary = (np.array(ca.DM(part))[3] for part in (lines.real, lines.imaginary))
     return dict(zip(lines.orders.tolist(), (real + 1j * imaginary).tolist(), strict=True))
 

@@ -10,7 +10,8 @@ import pytest
 
 from laufruhe.files.reader import load
 from laufruhe.load_models.amplitudes import amplitude_objective
-from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols, rotor_throws_of
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.load_models.uneven_model import UnevenModel
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
@@ -171,15 +172,17 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     count = 3 if layout == "vee" else 6
     start = Candidate(tuple(rng.uniform(0.0, math.tau, count)), None, bank, split)
     problem = replace(phasing.problem_of(start), phasing=None)
-    domains, layout_of_start = domains_of(problem.unbalances), phasing.layout(bank, split)
-    moved = tuple(rng.uniform(0.0, math.tau, count))
-    bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
+    domains, moves = (
+        domains_of(problem.unbalances),
+        ThrowMoves(phasing, phasing.layout(bank, split), start, phasing.intervals),
+    )
+    x = rng.uniform(0.0, math.tau, moves.size)
+    x[count - 1 :] = np.radians([-11.0, 19.0])[: moves.size - count + 1]
     columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in domains)])[1:]
-    at = UnevenSymbols([ca.DM(angle) for angle in moved], bank, split, ca.DM(columns))
-    model = UnevenModel(problem, layout_of_start, rotor_throws_of(phasing, start), at)
+    model = UnevenModel(problem, moves, x, ca.DM(columns))
     quantity = problem.objective[0].measure
     smooth = float(smooth_value(model, quantity, 1e-9))
-    exact = phasing.problem_of(Candidate(moved, None, bank, split))
+    exact = phasing.problem_of(moves.candidate(x))
     design = exact.design([d.complex_value(columns) for d in domains])
     assert smooth == pytest.approx(evaluate(exact, design).value(quantity), rel=tolerance)
     rows, grid = model.rows(quantity)

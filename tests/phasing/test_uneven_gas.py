@@ -11,7 +11,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.load_models import uneven_model
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols, rotor_throws_of
+from laufruhe.load_models.uneven_model import UnevenModel
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
@@ -51,29 +51,27 @@ def scene(folder, name, rest=MOUNT_FORCE):
     return phasing, start, ThrowMoves(phasing, places, start, phasing.intervals)
 
 
-def model_of(phasing, start, at):
-    problem = replace(phasing.problem_of(start), phasing=None)
-    layout = phasing.layout(start.bank_angle, start.split_pin)
-    return UnevenModel(problem, layout, rotor_throws_of(phasing, start), at)
+def model_of(moves, x, start=None):
+    """Return the smooth model at deviations x, of the problem of a start."""
+    return UnevenModel(replace(moves.phasing.problem_of(start or moves.start), phasing=None), moves, x, ca.DM(0, 1))
 
 
 def moved(moves, x):
-    """Return the symbols at deviations x, and the exact problem there."""
-    return UnevenSymbols(*moves.angles(x), ca.DM(0, 1)), replace(
-        moves.phasing.problem_of(moves.candidate(x)), phasing=None
-    )
+    """Return the exact problem at deviations x."""
+    return replace(moves.phasing.problem_of(moves.candidate(x)), phasing=None)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_every_order_is_that_of_the_exact_model(tmp_path, name, monkeypatch):
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
     monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
-    phasing, start, moves = scene(tmp_path, name)
+    moves = scene(tmp_path, name)[2]
     rng = np.random.default_rng(3)
     for _ in range(3):
-        at, exact = moved(moves, rng.uniform(-0.25, 0.25, moves.size))
+        x = rng.uniform(-0.25, 0.25, moves.size)
+        exact = moved(moves, x)
         wrench = evaluate(exact).loads[0].wrench
-        lines = model_of(phasing, start, at).wrench(exact.points[0])
+        lines = model_of(moves, x).wrench(exact.points[0])
         parts = [np.array(part, dtype=float) for part in (lines.real, lines.imaginary)]
         smooth = {float(h): np.stack([part[:, k] for part in parts], axis=1) for k, h in enumerate(lines.orders)}
         assert 0.0 in smooth
@@ -89,16 +87,16 @@ def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name, monkey
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
     monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
     rms = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "rms")
-    phasing, start, moves = scene(tmp_path, name, rms)
+    moves = scene(tmp_path, name, rms)[2]
     x = ca.SX.sym("x", moves.size)
-    model = model_of(phasing, start, UnevenSymbols(*moves.angles(x), ca.DM(0, 1)))
+    model = model_of(moves, x)
     quantity = model.problem.objective[0].measure
     norm = smooth_value(model, quantity, 1e-9)
     smooth = ca.Function("norm", [x], [norm, ca.gradient(norm, x)])
     point = np.random.default_rng(4).uniform(-0.2, 0.2, moves.size)
 
     def exact(x):
-        return evaluate(moved(moves, x)[1]).value(quantity)
+        return evaluate(moved(moves, x)).value(quantity)
 
     value, slope = (np.array(part, dtype=float).ravel() for part in smooth(point))
     # bends of the torque that the exact model carries beside its orders
@@ -112,9 +110,10 @@ def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name, monkey
 @pytest.mark.parametrize("measure", ["mean", "maximum"])
 def test_orders_left_out_hardly_change_sampled_measures(tmp_path, measure):
     objective = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", measure)
-    phasing, start, moves = scene(tmp_path, "four-stroke five", objective)
-    at, exact = moved(moves, np.random.default_rng(5).uniform(-0.2, 0.2, moves.size))
-    model = model_of(phasing, start, at)
+    moves = scene(tmp_path, "four-stroke five", objective)[2]
+    x = np.random.default_rng(5).uniform(-0.2, 0.2, moves.size)
+    exact = moved(moves, x)
+    model = model_of(moves, x)
     quantity = exact.objective[0].measure
     assert float(smooth_value(model, quantity, 1e-6)) == pytest.approx(evaluate(exact).value(quantity), rel=1e-2)
 
@@ -122,20 +121,23 @@ def test_orders_left_out_hardly_change_sampled_measures(tmp_path, measure):
 def test_all_points_have_the_samples_that_the_highest_order_of_any_needs(tmp_path):
     """A motored point has few orders; the mean of the fired one is that of the exact model all the same."""
     motored = '[[operating_points]]\nname = "motored"\nspeed = "3000 rpm"\ngas = false\nweight = 2\n'
-    phasing, start, moves = scene(tmp_path, "four-stroke five", MOUNT_FORCE + motored)
-    at, exact = moved(moves, np.random.default_rng(5).uniform(-0.2, 0.2, moves.size))
+    moves = scene(tmp_path, "four-stroke five", MOUNT_FORCE + motored)[2]
+    x = np.random.default_rng(5).uniform(-0.2, 0.2, moves.size)
+    exact = moved(moves, x)
     quantity = exact.objective[0].measure
-    smooth = float(smooth_value(model_of(phasing, start, at), quantity, 1e-9))
+    smooth = float(smooth_value(model_of(moves, x), quantity, 1e-9))
     assert smooth == pytest.approx(evaluate(exact).value(quantity), rel=1e-5)
 
 
 def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
     phasing, start, moves = scene(tmp_path, "four-stroke five")
-    at, exact = moved(moves, np.random.default_rng(6).uniform(-0.2, 0.2, moves.size))
+    x = np.random.default_rng(6).uniform(-0.2, 0.2, moves.size)
+    exact = moved(moves, x)
     rms = replace(exact.objective[0].measure, norm=NORMS["rms"])
-    own = float(smooth_value(model_of(phasing, start, at), rms, 1e-9))
-    turned = replace(at, throws=[angle + 0.7 for angle in at.throws])
-    assert float(smooth_value(model_of(phasing, start, turned), rms, 1e-9)) == pytest.approx(own, rel=1e-12)
+    own = float(smooth_value(model_of(moves, x), rms, 1e-9))
+    further = replace(start, throws=tuple(angle + 0.7 for angle in start.throws))
+    turned = model_of(ThrowMoves(phasing, moves.layout, further, moves.intervals), x, start)
+    assert float(smooth_value(turned, rms, 1e-9)) == pytest.approx(own, rel=1e-12)
     # counted from the other end the roll moment is the same
     roll = '[objective]\nminimise = "mean roll moment"\n'
     phasing, start, moves = scene(tmp_path, "four-stroke five", roll)

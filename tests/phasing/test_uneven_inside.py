@@ -16,10 +16,10 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models import uneven_model
-from laufruhe.load_models.block_loads import OpenCrankLoads, _relevant_orders
+from laufruhe.load_models.symbolic_spectrum import relevant_orders
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.throw_waves import ThrowWaves
-from laufruhe.load_models.uneven_model import rotor_throws_of
+from laufruhe.load_models.uneven_model import UnevenModel, rotor_throws_of
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.decision import domains_of
@@ -97,7 +97,7 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     star_problem = replace(phasing.problem_of(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, phasing.intervals)
     turns, columns = ca.MX.sym("t", moves.size), ca.MX.sym("u", 1)
-    model = OpenCrankLoads(star_problem, moves, turns, columns)
+    model = UnevenModel(star_problem, moves, turns, columns)
     rng = np.random.default_rng(7)
     x = np.clip(rng.uniform(-0.1, 0.1, moves.size), moves.lower, moves.upper)
     moved = replace(phasing.problem_of(moves.candidate(x)), phasing=None)
@@ -308,4 +308,4 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
 def test_orders_matter_by_their_share_of_the_largest_motion(unit: float) -> None:
     """In any unit of the load; high orders move the block by less, and a load of nothing moves it not at all."""
     sizes, orders = np.array([1.0, 0.5, 0.0, 1e-12, 0.8]), np.array([0.0, 1.0, 2.0, 3.0, 1e6])
-    assert _relevant_orders(unit * sizes, orders).tolist() == [0, 1]
+    assert relevant_orders(unit * sizes, orders).tolist() == [0, 1]

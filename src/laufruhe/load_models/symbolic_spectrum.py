@@ -9,10 +9,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.spectrum import base_of
+
+# size below which an order is left out, relative to the largest order
+MIN_SHARE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,7 @@ class SymbolicSpectrum:
         cosine, sine = cosines_and_sines(self.orders.tolist(), self.base, steps)
         return (self.real @ cosine - self.imaginary @ sine).T
 
-    def select(self, indices: NDArray[np.intp]) -> SymbolicSpectrum:
+    def select(self, indices: Indices) -> SymbolicSpectrum:
         """Return the spectrum with the orders at these indices only."""
         columns = indices.tolist()
         return SymbolicSpectrum(self.orders[indices], self.real[:, columns], self.imaginary[:, columns])
@@ -49,3 +51,11 @@ def cosines_and_sines(orders: Sequence[float], base: float, samples: int) -> tup
     angles = 2.0 * np.pi / base * np.arange(samples) / samples
     phases = np.outer(orders, angles)
     return ca.DM(np.cos(phases)), ca.DM(np.sin(phases))
+
+
+def relevant_orders(sizes: Array, orders: Array) -> Indices:
+    """Return the indices of orders that are not negligible in load or motion, from the size of each order's load."""
+    # above resonance the motion is the load over the square of the frequency
+    motions = sizes / np.maximum(orders, 1.0) ** 2
+    has_load = sizes > MIN_SHARE * sizes.max(initial=0.0)
+    return np.flatnonzero(has_load & (motions > MIN_SHARE * motions.max(initial=0.0)))

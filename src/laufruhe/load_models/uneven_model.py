@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -29,13 +29,13 @@ from laufruhe.load_models.isolated_cylinders import (
     motored,
     split_by_bank,
 )
-from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
+from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum, relevant_orders
+from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine import OperatingPoint, Rotor
-from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, stacked_coefficients
-from laufruhe.problem.decision import Domain, domains_of
+from laufruhe.problem.decision import Domain, column_scales, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure, counted_rotors, narrow_signal, radius_of
@@ -48,67 +48,54 @@ _NEGLIGIBLE = 1e-12
 # largest share of the root mean square of a component in omitted orders: of the lowest orders, their number, and of
 # the others up to the highest; gas and jumps of the pressure have orders without end
 LOW_LEFT_OUT, LOWEST, LEFT_OUT, HIGHEST = 1e-9, 24, 1e-3, 24.0
-
-
-@dataclass(frozen=True, eq=False)
-class UnevenSymbols:
-    """Variables of a smooth program, as CasADi symbols or numbers.
-
-    Attributes
-    ----------
-    throws
-        Angle of every throw [rad], with cylinder 1 at its dead centre at crank angle zero.
-    bank, split
-        Bank angle and split pin [rad]; None if the layout has none.
-    unbalances
-        Decision vector of the unbalances.
-    """
-
-    throws: Sequence[Any]
-    bank: Any
-    split: Any
-    unbalances: Any
+# random designs at which sizes of orders are compared
+PROBES = 6
 
 
 class UnevenModel:
-    """Measures of a problem as smooth expressions of throws, bank angle, split pin and unbalances.
+    """Loads of a crank with open angles, smooth in throws, bank angle, split pin and unbalances (S19, S23).
 
     Parameters
     ----------
     problem
-        Problem with the crank star and firing order from which a program starts.
-    rotor_throws
-        Index of the throw that each rotor turns with; rotors that turn with none are left out.
-    symbols
-        Variables of the expressions.
+        Problem with the crank star from which the open angles are counted.
+    moves
+        Open angles and their bounds.
+    deviations, unbalances
+        CasADi symbols or numbers of the open angles [rad], and of the decision vector of the unbalances.
     """
 
-    def __init__(self, problem: Problem, layout: Layout, rotor_throws: dict[str, int], symbols: UnevenSymbols) -> None:
-        self.problem, self._rotor_throws, self._symbols = problem, rotor_throws, symbols
+    def __init__(self, problem: Problem, moves: ThrowMoves, deviations: Any, unbalances: Any) -> None:
+        self.problem, self._moves, self._variables = problem, moves, [deviations, unbalances]
         self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
+        self._rotor_throws, layout = rotor_throws_of(moves.phasing, moves.start), moves.layout
+        self._throws, open_bank, open_split = moves.angles(deviations)
         parts = problem.engine.slider_cranks
         firsts = [layout.pins.index(pin) for pin in range(len(layout.throw_positions))]
         self._start = [parts[k].throw - layout.pin_offsets[k] for k in firsts]
         engine, inside = problem.engine, any(measure.is_inside for measure in problem.measures)
         # loads that add up: evaluations, the factor of each, and the angle by which their phases are ahead
         self._sources: list[tuple[Sequence[Evaluation], Sequence[Any], Any]] = []
-        cylinders = evaluate_cylinders(problem, layout, symbols.bank is not None, inside)
+        cylinders = evaluate_cylinders(problem, layout, open_bank is not None, inside)
         for k, (part, cylinder) in enumerate(zip(parts, cylinders, strict=True)):
             side = layout.side(k)
-            bank = side * symbols.bank if symbols.bank is not None else part.bank
-            offset = -side * symbols.split if symbols.split is not None else layout.pin_offsets[k]
+            bank = side * open_bank if open_bank is not None else part.bank
+            offset = -side * open_split if open_split is not None else layout.pin_offsets[k]
             # the firing order fixes the number of turns before the firing
             turns = round((part.firing_angle + part.throw - part.bank) / math.tau)
-            angle = symbols.throws[layout.pins[k]] + offset - bank - math.tau * turns
+            angle = self._throws[layout.pins[k]] + offset - bank - math.tau * turns
             self._sources.append((cylinder, (ca.cos(bank), ca.sin(bank), 1.0)[-len(cylinder) :], angle))
         if engine.is_loaded:
             fixed = isolate_rotors(engine, (), inside).loaded_as(engine)
             self._sources.append(((evaluate(motored(problem), fixed),), (1.0,), 0.0))
         self._gas_and_inertia = sum(len(evaluations) for evaluations, _, _ in self._sources)
+        # unbalance of every rotor as expressions (re, im) [kg m]
+        at_zero = problem.design([0.0] * len(problem.unbalances), problem.unbalances)
+        self._unbalances = {rotor.name: self._unbalance(rotor, unbalances) for rotor in at_zero.rotors}
         for rotor in engine.rotors:
             units = [isolate_rotors(engine, [replace(rotor, unbalance=u)], inside) for u in (1.0, 1.0j)]
             pair = [evaluate(motored(problem), unit) for unit in units]
-            self._sources.append((pair, ca.vertsplit(self._unbalance(rotor)), 0.0))
+            self._sources.append((pair, ca.vertsplit(self._unbalances[rotor.name]), 0.0))
 
     def rows(self, measure: Measure) -> tuple[Any, Grid]:
         """Return the vectors (rows) whose norm is a measure, shape (k, d), as CasADi expressions, and their grid (P1).
@@ -117,7 +104,7 @@ class UnevenModel:
         """
         if measure.is_mass:
             counted = counted_rotors(measure, self.problem.engine.rotors)
-            rows = [(self._unbalance(r) / radius_of(r)).T for r in counted]
+            rows = [(self._unbalances[r.name] / radius_of(r)).T for r in counted]
             return ca.vertcat(*rows), Grid(np.ones(len(rows)), 1)
         engine, chosen = self.problem.engine, [point for point in self.problem.points if measure.includes_point(point)]
         total_weight = sum(point.weight for point in chosen)
@@ -146,6 +133,27 @@ class UnevenModel:
         """Return the symbolic wrench on the block at an operating point."""
         load, basis, _ = self._load(point, lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :]))
         return load.mapped(basis.full().T)
+
+    def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
+        """Return the symbolic wrench on the block at every operating point, multiplied by a 6 x 6 `transform`.
+
+        Orders that are small at all of `PROBES` random designs are left out.
+        """
+        relevant, bounds = [], column_scales(self.domains)
+        for point in self.problem.points:
+            wrench = self.wrench(point).mapped(transform)
+            function = ca.Function("sizes", self._variables, [wrench.real, wrench.imaginary])
+            generator = np.random.default_rng(0)
+            designs = [
+                (
+                    generator.uniform(self._moves.lower, self._moves.upper),
+                    bounds * generator.uniform(-1.0, 1.0, len(bounds)),
+                )
+                for _ in range(PROBES)
+            ]
+            values = [np.abs(np.array(part, dtype=float)) for design in designs for part in function(*design)]
+            relevant.append(wrench.select(relevant_orders(np.max(values, axis=(0, 1)), wrench.orders)))
+        return relevant
 
     def _load(
         self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum]
@@ -183,26 +191,20 @@ class UnevenModel:
             real, imaginary = real + a * cosine - b * sine, imaginary + a * sine + b * cosine
         return SymbolicSpectrum(orders, real, imaginary), ca.DM(basis), places
 
-    def _unbalance(self, rotor: Rotor) -> Any:
-        """Return the unbalance of a rotor as expressions (re, im) [kg m], at the present angle of its throw."""
+    def _unbalance(self, rotor: Rotor, columns: Any) -> Any:
+        # from the rotor with all open unbalances at zero; a rotor on a throw turns with it
         real: Any = rotor.unbalance.real
         imaginary: Any = rotor.unbalance.imag
         for domain in self.domains:
             for drive in domain.decision.rotor_drives:
-                if drive.rotor != rotor.name:
-                    continue
-                columns = self._symbols.unbalances[domain.columns]
-                for j, direction in enumerate(domain.set.directions):
-                    d = drive.of(direction)
-                    real = real + d.real * columns[j]
-                    imaginary = imaginary + d.imag * columns[j]
-                # the unbalance of the rotor has the baseline value of the decision in it
-                initial = drive.of(domain.decision.start)
-                real, imaginary = real - initial.real, imaginary - initial.imag
+                for j, direction in enumerate(domain.set.directions if drive.rotor == rotor.name else ()):
+                    gain = drive.of(direction)
+                    real = real + gain.real * columns[domain.start + j]
+                    imaginary = imaginary + gain.imag * columns[domain.start + j]
         if rotor.name not in self._rotor_throws:
             return ca.vertcat(real, imaginary)
         pin = self._rotor_throws[rotor.name]
-        turn = self._symbols.throws[pin] - self._start[pin]
+        turn = self._throws[pin] - self._start[pin]
         cosine, sine = ca.cos(turn), ca.sin(turn)
         return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.load_models.block_loads import FixedCrankLoads, OpenCrankLoads, SymbolicLoads
+from laufruhe.load_models.block_loads import FixedCrankLoads, SymbolicLoads
 from laufruhe.load_models.labelled_rows import column_names
 from laufruhe.load_models.mount_symbols import (
     PointResponse,
@@ -34,6 +34,7 @@ from laufruhe.load_models.mount_symbols import (
 )
 from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.load_models.uneven_model import UnevenModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Grid, softened_lengths
@@ -113,7 +114,7 @@ class SmoothProgram:
             affine = AffineModel(off_resonance(problem))
             self._loads = FixedCrankLoads(affine, self._unbalance_columns)
         else:
-            self._loads = OpenCrankLoads(problem, moves, self._throw_deviations, self._unbalance_columns)
+            self._loads = UnevenModel(problem, moves, self._throw_deviations, self._unbalance_columns)
         self._softness = ca.MX.sym("softness")
         self._constraints = ConstraintCollector()
         self._modes = ModeVariables(problem, self._constraints)
