@@ -120,7 +120,7 @@ def test_roll_of_the_block_follows_from_its_mount_travels():
         x, y, z = np.array(mount.position) - middle
         rows.append(np.hstack([np.eye(3), np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])]))
     for y in rng.standard_normal((4, 6)):
-        own = (model.travels @ y).reshape(-1, 3)
+        own = (model.stops.rows @ y).reshape(-1, 3)
         global_axes = np.einsum("mab,ma->mb", np.array([m.orientation for m in mounting.mounts]), own)
         motion, *_ = np.linalg.lstsq(np.vstack(rows), global_axes.reshape(-1), rcond=None)
         assert model.roll @ y == pytest.approx(motion[3], rel=1e-9)

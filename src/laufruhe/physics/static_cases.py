@@ -92,7 +92,9 @@ def stops_of(mounting: ElasticMounting) -> Stops:
 def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
     """Return the equilibrium of the block under a load case (E55)."""
     wrench, stops = case_wrench(mounting.block, case), stops_of(mounting)
-    q = _balanced(mounting.stiffness, stops, wrench)
+    (q,), is_done = equilibria(mounting.stiffness[None], stops, wrench)
+    if not is_done.all():
+        raise SolverError("no balance was found under a load case; check the stiffness of bump stops")
     beyond = stops.stiffness * stops.beyond(stops.rows @ q)
     travel = mounting.motions @ q
     force = np.einsum("mij,mj->mi", mounting.springs, travel) + (stops.directions @ beyond).reshape(-1, 3)
@@ -101,28 +103,36 @@ def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
     return Settled(q, travel, force, names)
 
 
-def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
-    """Return the static motion of a block under a wrench, shape (6,): that of least energy with its stops."""
+def equilibria(stiffness: Array, stops: Stops, wrench: Array) -> tuple[Array, Mask]:
+    """Return the motions of least energy under a wrench, shape (n, 6), and a mask of those that have converged.
 
-    def energy(q: Array) -> float:
-        over = stops.beyond(stops.rows @ q)
-        return float(0.5 * q @ stiffness @ q + 0.5 * stops.stiffness @ over**2 - wrench @ q)
+    `stiffness` has the matrix of each of n mountings with the same stops, shape (n, 6, 6).
+    """
 
-    q: Array = np.asarray(np.linalg.solve(stiffness, wrench), dtype=np.float64)
+    def energy(q: Array) -> Array:
+        over = stops.beyond(q @ stops.rows.T)
+        return np.asarray(
+            0.5 * np.einsum("ni,nij,nj->n", q, stiffness, q) + 0.5 * over**2 @ stops.stiffness - q @ wrench
+        )
+
+    q: Array = np.asarray(np.linalg.solve(stiffness, wrench[:, None])[..., 0], dtype=np.float64)
+    is_done = np.zeros(len(q), dtype=bool)
     for _ in range(MAX_STEPS):
-        over = stops.beyond(stops.rows @ q)
-        pull = wrench - stiffness @ q - stops.rows.T @ (stops.stiffness * over)
-        step: Array = np.asarray(np.linalg.solve(stiffness + stops.added(over != 0.0), pull), dtype=np.float64)
-        if np.linalg.norm(step) <= CLOSED * np.linalg.norm(q):
-            return q
-        here, share = energy(q), 1.0
+        over = stops.beyond(q @ stops.rows.T)
+        pull = wrench - np.einsum("nij,nj->ni", stiffness, q) - (stops.stiffness * over) @ stops.rows
+        tangent = stiffness + stops.added(over != 0.0)
+        step: Array = np.asarray(np.linalg.solve(tangent, pull[..., None])[..., 0], dtype=np.float64)
+        is_done |= np.linalg.norm(step, axis=1) <= CLOSED * np.linalg.norm(q, axis=1)
+        start, slope, share = energy(q), np.einsum("ni,ni->n", pull, step), np.ones(len(q))
         for _ in range(HALVINGS):
             # near a gap the fall that is left is below the rounding error of energies
-            if energy(q + share * step) <= here - 1e-4 * share * float(pull @ step) + ROUNDED * abs(here):
+            is_lower = energy(q + share[:, None] * step) <= start - 1e-4 * share * slope + ROUNDED * np.abs(start)
+            if np.all(is_lower | is_done):
                 break
-            share *= 0.5
-        else:
-            # only rounding errors are left
-            return q
-        q = q + share * step
-    raise SolverError("no balance was found under a load case; check the stiffness of bump stops")
+            share = np.where(is_lower, share, 0.5 * share)
+        # without a fall only rounding errors are left
+        is_done |= ~is_lower
+        if is_done.all():
+            break
+        q = np.where(is_done[:, None], q, q + share[:, None] * step)
+    return q, is_done

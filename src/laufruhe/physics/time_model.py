@@ -13,7 +13,7 @@ from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import DynamicSprings, ElasticMounting
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
-from laufruhe.physics.static_cases import stops_of
+from laufruhe.physics.static_cases import Stops, stops_of
 
 NO_LAW = "a stiffness measured over frequency has no law in time; give a fluid_track, or leave time and run-ups out"
 
@@ -26,14 +26,10 @@ class TimeModel:
     ----------
     load
         From a wrench about the origin to y, shape (n, 6).
-    travels
-        From y to travel along the own axes of the springs, shape (3 springs, n).
     forces, damping_forces
         From y and y' to the mount forces in the axes of C2, shape (3 mounts, n).
-    gaps, stops
-        Of the bump stops along every own axis, shape (3 springs,).
-    directions
-        From the forces of the bump stops to the mount forces, shape (3 mounts, 3 springs).
+    stops
+        Bump stops, with rows from y to travel along the own axes of the springs, shape (3 springs, n).
     points
         From y to the travel of the mounts in the axes of C2, shape (3 mounts, n).
     roll
@@ -43,12 +39,9 @@ class TimeModel:
     stiffness: Array
     damping: Array
     load: Array
-    travels: Array
     forces: Array
     damping_forces: Array
-    gaps: Array
-    stops: Array
-    directions: Array
+    stops: Stops
     points: Array
     roll: Array
 
@@ -60,18 +53,16 @@ class TimeModel:
     @property
     def has_stops(self) -> bool:
         """True if any bump stop can be met."""
-        return bool(np.any(self.stops > 0.0))
+        return bool(np.any(self.stops.stiffness > 0.0))
 
     def stop_forces(self, y: Array) -> Array:
         """Return the stop forces along the own axes, shape (3 springs, times), of y (n, times) (E27)."""
-        travel = self.travels @ y
-        gaps = self.gaps[:, None]
-        return np.asarray(self.stops[:, None] * (travel - np.clip(travel, -gaps, gaps)))
+        return np.asarray((self.stops.beyond((self.stops.rows @ y).T) * self.stops.stiffness).T)
 
     def mount_forces(self, y: Array, rate: Array) -> Array:
         """Return the mount forces over time, shape (times, mounts, 3), from motion y and its rate, (n, times) each."""
         out = self.forces @ y + self.damping_forces @ rate
-        out = out + self.directions @ self.stop_forces(y) if self.has_stops else out
+        out = out + self.stops.directions @ self.stop_forces(y) if self.has_stops else out
         return np.asarray(out.T.reshape(y.shape[1], -1, 3))
 
     def mount_travels(self, y: Array) -> Array:
@@ -81,7 +72,7 @@ class TimeModel:
     def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
         """Return y'' of columns (n, times)."""
         out = load - self.stiffness @ y - self.damping @ rate
-        return out - self.travels.T @ self.stop_forces(y) if self.has_stops else out
+        return out - self.stops.rows.T @ self.stop_forces(y) if self.has_stops else out
 
 
 def time_model(mounting: ElasticMounting) -> TimeModel:
@@ -103,12 +94,9 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
         stiffness=root @ mounting.stiffness @ root.T,
         damping=np.einsum("mai,maj->ij", motions, damper_forces),
         load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
-        travels=stops.rows @ root.T,
         forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
         damping_forces=damper_forces.reshape(3 * mounts, 6),
-        gaps=stops.gaps,
-        stops=stops.stiffness,
-        directions=stops.directions,
+        stops=replace(stops, rows=stops.rows @ root.T),
         points=motions.reshape(-1, 6),
         roll=root.T[3],
     )
@@ -140,7 +128,7 @@ def _with_fluid(model: TimeModel, dynamic: DynamicSprings, root: Array) -> TimeM
         stiffness=np.block([[block, across], [across.T, np.diag((bulge + lower) / mass)]]),
         damping=np.pad(model.damping, (wider, wider)) + np.diag(np.concatenate([np.zeros(6), damping / mass])),
         load=np.pad(model.load, (wider, (0, 0))),
-        travels=np.pad(model.travels, ((0, 0), wider)),
+        stops=replace(model.stops, rows=np.pad(model.stops.rows, ((0, 0), wider))),
         points=np.pad(model.points, ((0, 0), wider)),
         forces=np.hstack([
             model.forces + dynamic.directions @ ((bulge - static)[:, None] * seen), -dynamic.directions * swelling

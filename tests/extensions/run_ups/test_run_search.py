@@ -79,9 +79,9 @@ def by_scipy(engine: Engine, problem: Problem) -> tuple[float, float]:
             speed, angle = first + gain * t, first * t + gain * t * t / 2.0
             driven = speed**2 * (coefficients @ np.exp(orders * angle)).real
             y, rate = z[:6], z[6:]
-            moved = model.travels @ y
-            stop = model.stops * np.sign(moved) * np.maximum(np.abs(moved) - model.gaps, 0.0)
-            push = driven - model.stiffness @ y - model.damping @ rate - model.travels.T @ stop
+            moved = model.stops.rows @ y
+            stop = model.stops.stiffness * np.sign(moved) * np.maximum(np.abs(moved) - model.stops.gaps, 0.0)
+            push = driven - model.stiffness @ y - model.damping @ rate - model.stops.rows.T @ stop
             return np.concatenate([rate, push])
 
         times = np.linspace(0.0, seconds, 12_000)

@@ -80,8 +80,8 @@ def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> Non
     run = LinearRun(model, Sweep(0.0, 1.0, step, 4))
     side = _batch_of([run], step)
     rates, _, inverse = run.modes
-    met = np.flatnonzero(model.stops)
-    into = inverse @ model.travels[met].T
+    met = np.flatnonzero(model.stops.stiffness)
+    into = inverse @ model.stops.rows[met].T
     for k, rate in enumerate(rates):
         integrals = [side.first[0][2 * k : 2 * k + 2], side.second[0][2 * k : 2 * k + 2]]
         for found, weight in zip(integrals, (lambda _: 1.0, lambda t: t / step), strict=True):

@@ -27,6 +27,7 @@ from laufruhe.machine import Block, Mount
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.physics.static_cases import Stops
 from laufruhe.physics.time_model import TimeModel
 from mounts.powertrain import powertrain, wrench
 from physics.test_static_motion import HEAVE, four_mounts
@@ -84,7 +85,7 @@ def stopped(travels: Array, gaps: Array, stops: Array, stiffness: Array) -> Time
     """Return a model of two coordinates with stops and no block."""
     none = np.zeros((3, 2))
     return TimeModel(
-        stiffness, np.diag([4.0, 6.0]), np.eye(2, 6), travels, none, none, gaps, stops, np.eye(3)[None],
+        stiffness, np.diag([4.0, 6.0]), np.eye(2, 6), none, none, Stops(travels, gaps, stops, np.eye(3)[None]),
         np.zeros(1, dtype=np.intp), np.zeros(2),
     )  # fmt: skip
 
@@ -113,7 +114,7 @@ def test_stops_push_back_as_scipy_says() -> None:
     assert reach.min() < -1.5 * gaps[0]
     assert np.abs(found.y[:, ::20] - exact[:2]).max() < 2e-4 * np.abs(exact[:2]).max()
     wrenches = sweep.wrenches([(np.array([1.0]), wrench[None] + 0j)])
-    stiff = replace(model, stops=np.array([3e6, 0.0, 0.0]))
+    stiff = replace(model, stops=replace(model.stops, stiffness=np.array([3e6, 0.0, 0.0])))
     assert responses_to([stiff], sweep, [wrenches]) == [None]
     assert responses_to([model, stiff], sweep, [wrenches] * 2) == [None, None]
     assert responses_to([model, None], sweep, [wrenches] * 2) == [None, None]

@@ -120,7 +120,7 @@ def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
     limits = (limit for limit in problem.limits if limit.measure in travels)
     maximum = min((limit.maximum for limit in limits), default=math.inf)
     model = time_model(mounting_in(problem.engine))
-    gaps = model.gaps[model.stops > 0.0]
+    gaps = model.stops.gaps[model.stops.stiffness > 0.0]
     is_too_stiff = any(quickest(model) * sweep.step > QUICKEST for sweep in peaks.sweeps)
     return not is_too_stiff and maximum * (1.0 + MARGIN) < float(gaps.min())
 

@@ -28,8 +28,9 @@ class RunMatrices:
 
     def __init__(self, model: BoxModel) -> None:
         self._model = model
-        model_at_lower = time_model(model.mounting(model.lower))
-        self.base = replace(model_at_lower, stops=np.zeros_like(model_at_lower.stops))
+        at_lower = time_model(model.mounting(model.lower))
+        no_stops = replace(at_lower.stops, stiffness=np.zeros_like(at_lower.stops.stiffness))
+        self.base = replace(at_lower, stops=no_stops)
 
     @cached_property
     def motion(self) -> LinearMaps:

@@ -96,7 +96,7 @@ def responses_to(
 
 def quickest(model: TimeModel) -> float:
     """Return an upper bound of the angular frequency of the block on its stops alone [rad/s]."""
-    return float(np.linalg.norm(np.sqrt(model.stops)[:, None] * model.travels, 2))
+    return float(np.linalg.norm(np.sqrt(model.stops.stiffness)[:, None] * model.stops.rows, 2))
 
 
 def _batch_of(runs: Sequence[LinearRun], step: float) -> _DesignBatch:
@@ -105,24 +105,24 @@ def _batch_of(runs: Sequence[LinearRun], step: float) -> _DesignBatch:
     parts = []
     for run in runs:
         model, (rates, shapes, inverse) = run.model, run.modes
-        mode_loads = inverse @ model.travels[with_stops].T
+        mode_loads = inverse @ model.stops.rows[with_stops].T
         growth, x = np.exp(rates * step), rates * step
         # series for rates near zero
         is_small = np.abs(x) < 1e-4
         divisor = np.where(is_small, 1.0, x)
         constant_weight = np.where(is_small, 1.0 + 0.5 * x, (growth - 1.0) / divisor)
         linear_weight = np.where(is_small, 0.5 + x / 6.0, (growth - 1.0 - x) / divisor**2)
-        travel_of_modes = model.travels[with_stops] @ shapes[: model.size]
+        travel_of_modes = model.stops.rows[with_stops] @ shapes[: model.size]
         first, second = (step * weight[:, None] * mode_loads for weight in (constant_weight, linear_weight))
         stiffness = _stiffness(model)[with_stops]
-        gaps = np.where(stiffness > 0.0, model.gaps[with_stops], np.inf)
+        gaps = np.where(stiffness > 0.0, model.stops.gaps[with_stops], np.inf)
         real_travel = np.stack([travel_of_modes.real, -travel_of_modes.imag], axis=-1).reshape(len(with_stops), -1)
         parts.append((growth, real_travel, _real_rows(first), _real_rows(second), gaps[:, None], stiffness[:, None]))
     return _DesignBatch(*(np.stack(part) for part in zip(*parts, strict=True)))
 
 
 def _stiffness(model: TimeModel) -> Array:
-    return np.where(np.isfinite(model.gaps), model.stops, 0.0)
+    return np.where(np.isfinite(model.stops.gaps), model.stops.stiffness, 0.0)
 
 
 def _real_rows(columns: ComplexArray) -> Array:

@@ -23,7 +23,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import total_stiffness
-from laufruhe.physics.static_cases import Stops, case_wrench, stops_of
+from laufruhe.physics.static_cases import Stops, case_wrench, equilibria, stops_of
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, counted_cases, motion_indices
 from laufruhe.problem.measure import Limit, Measure
@@ -32,7 +32,6 @@ from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders, is_travel
 from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 from laufruhe.prove.mounts.ranges import SLACK
 
-STEPS, HALVINGS = 30, 12
 # iterations of bounds of travel, factor beyond the implied bound, and growth of a step
 MAX_ROUNDS, WIDER, FASTER = 16, 1.0 + 1e-6, 1.4
 # accuracy of an equilibrium as a share of a stop's gap, and number of spans of travel within which a stop may close
@@ -70,7 +69,7 @@ def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) 
     matrices, soft = (np.where(stable[:, None, None], matrix, np.eye(6)) for matrix in (matrices, soft))
     for case in counted_cases(measure, model.problem.engine):
         load = model.root @ case_wrench(mounting.block, case)
-        travel = _equilibrium(matrices, stops, load) @ stops.rows.T
+        travel = equilibria(matrices, stops, load)[0] @ stops.rows.T
         signs, best_of_case = np.sign(stops.beyond(travel)), zero_bound(lower)
         for _ in range(2):
             bound, reach = _with_stops(model, measure, stops, load, (centres, halves, matrices, soft, travel), signs)
@@ -132,28 +131,6 @@ def _with_stops(
     box, best = np.arange(len(size)), np.argmax(minimum, axis=1)
     bound = LinearBound(size[box, best], slope[box, best], remainder[box, best], response.scores[:, 0])
     return bound.where(np.isfinite(minimum[box, best])), span
-
-
-def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:
-    """Return approximate static motions under a load, shape (boxes, 6); bounds hold for any accuracy of them."""
-
-    def energy(y: Array) -> Array:
-        elastic = 0.5 * np.einsum("bi,bij,bj->b", y, matrices, y) - y @ load
-        return np.asarray(elastic + 0.5 * stops.beyond(y @ stops.rows.T) ** 2 @ stops.stiffness)
-
-    y: Array = np.asarray(np.linalg.solve(matrices, load[:, None])[..., 0], dtype=np.float64)
-    for _ in range(STEPS):
-        over = stops.beyond(y @ stops.rows.T)
-        residual = load - np.einsum("bij,bj->bi", matrices, y) - (over * stops.stiffness) @ stops.rows
-        tangent = matrices + stops.added(over != 0.0)
-        step: Array = np.asarray(np.linalg.solve(tangent, residual[..., None])[..., 0], dtype=np.float64)
-        start_energy, share = energy(y), np.ones(len(y))
-        for _ in range(HALVINGS):
-            share = np.where(energy(y + share[:, None] * step) <= start_energy, share, 0.5 * share)
-        y = np.asarray(y + share[:, None] * step)
-        if np.all(np.linalg.norm(share[:, None] * step, axis=1) <= 1e-12 * np.linalg.norm(y, axis=1)):
-            break
-    return np.asarray(y)
 
 
 def _stop_errors(
