@@ -324,7 +324,7 @@ def test_the_box_with_the_least_bound_gives_a_design(tmp_path: Path) -> None:
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
     low, high = problem.decisions[0].lower, problem.decisions[0].upper
-    found = [evaluate_design_at(problem, [x]) for x in np.geomspace(low, high, 60)]
+    found = [evaluate_design_at(problem, [x], []) for x in np.geomspace(low, high, 60)]
     minimum = min(design.value for design in found if design is not None)
     assert result.objective is not None
     assert result.objective.value <= minimum * (1.0 + problem.tolerance)

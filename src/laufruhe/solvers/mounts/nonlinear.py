@@ -247,9 +247,7 @@ def _rebalanced(best: SearchResult) -> tuple[SearchResult, float | None]:
     result = solve_unbalances(replace(problem, engine=engine).balance)
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return best, None
-    mounts, columns = iter(numbers), iter(unbalance_values(problem, result))
-    values = [next(columns) if d.is_affine else next(mounts) for d in problem.decisions]
-    rebalanced = evaluate_design_at(problem, values)
+    rebalanced = evaluate_design_at(problem, numbers, unbalance_values(problem, result))
     if rebalanced is None or rebalanced.violation > FEASIBILITY_TOL:
         return best, None
     gap = result.certificate.gap

@@ -16,7 +16,6 @@ from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
 from laufruhe.solvers.mounts.starts import StartPoint, design_at_start, evaluate_design_at, start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct_optima, is_explored
@@ -216,14 +215,12 @@ class MountSearch:
     def _evaluate_optimum(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
         if not np.all(np.isfinite(optimum.x)):
             return None
-        mounts, unbalances = (iter(part) for part in joint.decision_values(optimum.x))
         try:
             problem = self.problem if self.moves is None else joint.problem_at(optimum.x)
         except ModelError:
             # the throws may violate the firing order if the search stopped early
             return None
-        values: list[Value] = [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions]
-        return evaluate_design_at(problem, values)
+        return evaluate_design_at(problem, *joint.decision_values(optimum.x))
 
     def _perturbed_throws(self, generator: np.random.Generator, k: int) -> Array:
         # a symmetric star may be a saddle point, so later starts are random

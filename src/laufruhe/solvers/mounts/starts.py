@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -40,19 +40,19 @@ StartPoint: TypeAlias = tuple[list[float], Array | None]
 """Numbers of the mounts [SI], and columns of the unbalances [kg m], or None for those of the best design."""
 
 
-def evaluate_design_at(problem: Problem, values: Sequence[Value]) -> Design | None:
-    """Return the exact evaluation of a design with these values of its decisions; None on an undamped resonance."""
+def evaluate_design_at(problem: Problem, mounts: Iterable[float], unbalances: Iterable[Value]) -> Design | None:
+    """Return the exact evaluation of a design with these mounts and unbalances; None on an undamped resonance."""
+    inner, outer = iter(mounts), iter(unbalances)
     try:
-        return evaluate_design(problem, values)
+        return evaluate_design(problem, [next(outer) if d.is_affine else next(inner) for d in problem.decisions])
     except ModelError:
         return None
 
 
 def design_at_start(problem: Problem, start: tuple[list[float], Array]) -> Design | None:
     """Evaluate the design at a start, mounts and columns of unbalances; None on an undamped resonance."""
-    mounts, columns = iter(start[0]), start[1]
-    unbalances = iter(domain.complex_value(columns) for domain in domains_of(problem.unbalances))
-    return evaluate_design_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])
+    unbalances = (domain.complex_value(start[1]) for domain in domains_of(problem.unbalances))
+    return evaluate_design_at(problem, start[0], unbalances)
 
 
 def _most_starts(problem: Problem) -> int:
