@@ -14,7 +14,6 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over, timed_rounds
 from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
 from laufruhe.solvers.mounts.starts import StartPoint, design_at_start, evaluate_design_at, start_points
@@ -37,9 +36,6 @@ MAX_TIGHTENED = 3
 MAX_REFINED = 1
 # iterations of a search that simulates in every step
 SIMULATED_ITERATIONS = 60
-# share of the objective's unit below which a search is repeated in a smaller unit, and number of repetitions
-SMALL = 1e-2
-MAX_SIZES = 3
 # deviation of start throws from their crank star [rad]
 THROW_DEVIATION = 0.02
 
@@ -109,22 +105,20 @@ class MountSearch:
     def run(self) -> None:
         """Search for the best mounts from all starts, and store the best result.
 
-        The search is repeated in a smaller unit of the objective if the result is far below the unit. If no time is
-        left and the first start is feasible, it is the result.
+        If no time is left and the first start is feasible, it is the result.
         """
         start = design_at_start(self.problem, self._points[0]) if is_time_over() and self.moves is None else None
         if start is not None and start.violation <= SLACK:
             self._update_best(SearchResult(start, self.joint))
             return
-        zero_level = numerical_zero(self.problem)
-        self._search(self._points)
-        for _ in timed_rounds(MAX_SIZES):
-            if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= zero_level:
-                break
-            # the solver's tolerance is relative to the unit of the objective
-            self._size = max(self.best.design.value, zero_level)
-            self.joint = self._program()
-            self._search([_start_of(self.best), *self._points[1:]])
+        generator = np.random.default_rng(self.problem.search.seed)
+        starts = [
+            self.joint.start(mounts, columns, self._perturbed_throws(generator, k))
+            for k, (mounts, columns) in enumerate(self._points)
+        ]
+        self._evaluate_optima(
+            self._solve(starts, lambda optima: is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12)))
+        )
         self._tighten()
 
     def refine(self) -> None:
@@ -173,16 +167,6 @@ class MountSearch:
         """Moves of the throws of the best design from their crank star [rad], shape (moves,)."""
         optimum = self.best.optimum if self.best is not None else None
         return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
-
-    def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
-        joint, generator = self.joint, np.random.default_rng(self.problem.search.seed)
-        starts = [
-            joint.start(mounts, columns, self._perturbed_throws(generator, k))
-            for k, (mounts, columns) in enumerate(points)
-        ]
-        self._evaluate_optima(
-            self._solve(starts, lambda optima: is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12)))
-        )
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
         return SmoothProgram(self.problem, self._size, margin, self.moves, coarser=self._coarser)
