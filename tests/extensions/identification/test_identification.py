@@ -73,16 +73,18 @@ def test_a_stated_deviation_belongs_to_its_file() -> None:
 
 
 @pytest.mark.slow
-def test_intervals_hold_true_numbers() -> None:
-    # 95 % of 300 engines by `synthetic.py`; with 60 intervals fewer than 50 have a chance of 0.1 %
+@pytest.mark.parametrize(("count", "least"), [(4, 15), pytest.param(12, 50, marks=pytest.mark.long)])
+def test_intervals_hold_true_numbers(count: int, least: int) -> None:
+    # 95 % of 300 engines by `synthetic.py`; 60 intervals of which fewer than 50 do have a chance of 0.1 %, as have
+    # 20 of which fewer than 15 do
     found = [
         inside
-        for seed in range(12)
+        for seed in range(count)
         for truth in (engine(seed),)
         for inside in hits(truth, estimate(measured(truth, np.random.default_rng(seed + 10_000), 0.05)))
     ]
-    assert len(found) > 54
-    assert np.mean(found) > 0.83
+    assert len(found) > 4.5 * count
+    assert sum(found) >= least / (5 * count) * len(found)
 
 
 def test_two_discs_in_one_plane_cannot_be_identified() -> None:
@@ -169,8 +171,9 @@ def test_a_unit_in_the_headings_counts_and_may_not_contradict(tmp_path: Path) ->
 
 
 def test_unbalances_stay_within_their_size(tmp_path: Path) -> None:
-    # phases of the other sign cannot be explained
+    # phases of the other sign cannot be explained; loads are affine in what is left open, which is quick
     path = _with_columns(tmp_path, lambda head: head)
+    path.write_text(lr.load(READY).fix("mounts.stiffness.3").fix("reciprocating mass").to_toml(), encoding="utf-8")
     for csv in tmp_path.glob("*.csv"):
         head, *rows = csv.read_text().splitlines()
         cells = [row.split(",") for row in rows]

@@ -18,6 +18,7 @@ from laufruhe.extensions.identification.measurement import Measurement
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.problem.decision import Domain, column_bounds, decision_vector, domains_of
+from laufruhe.problem.dependence import is_affine, open_kinds
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.sets import Value
 
@@ -129,9 +130,11 @@ def estimate(measurements: Sequence[Measurement], say: Callable[[str], None] = l
     deviations = np.array([m.deviation or 0.0 for m in measurements])
     for members in unstated.values():
         deviations[members] = 0.01 * _rms([measurements[k].values[measurements[k].mask] for k in members]) or 1.0
-    is_linear = all(decision.is_affine for decision in problem.decisions)
+    is_linear = all(decision.is_affine for decision in problem.decisions) and all(
+        is_affine(m.channel, open_kinds(m.problem), m.problem) for m in measurements
+    )
     starts = _starts(domains, low, high, 1 if is_linear else problem.search.starts, problem.search.seed)
-    model = _Model(measurements, domains)
+    model = (_LinearModel if is_linear else _Model)(measurements, domains)
     say(f"fitting {len(low)} numbers to {count} measured ones")
     best, spare = starts[0], 1.0 - len(low) / count
     for _ in range(_ROUNDS):
@@ -185,8 +188,7 @@ class _Model:
         return np.concatenate([domain.project(x) for domain in self.domains])
 
     def split(self, x: Array) -> list[ComplexArray]:
-        """Return computed less measured amplitudes of each measurement, at the nearest allowed columns [SI]."""
-        x = self.projected(x)
+        """Return computed less measured amplitudes of each measurement [SI]."""
         values = [value_of(domain, x) for domain in self.domains]
         evaluations: dict[int, Evaluation] = {}
         parts = []
@@ -197,7 +199,8 @@ class _Model:
         return parts
 
     def residual(self, x: Array) -> Array:
-        return stacked(self.split(x))
+        """Return all differences at the nearest allowed columns [SI]."""
+        return stacked(self.split(self.projected(x)))
 
     def weights(self, deviations: Sequence[float] | Array) -> Array:
         """Return the inverse of the deviation of each residual [1/SI]."""
@@ -212,6 +215,24 @@ class _Model:
             ends = np.minimum(x + step, high), np.maximum(x - step, low)
             columns.append((self.residual(ends[0]) - self.residual(ends[1])) / (ends[0] - ends[1])[k])
         return np.column_stack(columns)
+
+
+class _LinearModel(_Model):
+    """Model of orders that are affine in all columns, from two evaluations for each column."""
+
+    def __init__(self, measurements: Sequence[Measurement], domains: Sequence[Domain]) -> None:
+        super().__init__(measurements, domains)
+        low, high = column_bounds(domains)
+        self._middle, exact = 0.5 * (low + high), super().split
+        rest = exact(self._middle)
+        steps = [(exact(self._middle + step), exact(self._middle - step)) for step in np.diag(0.5 * (high - low))]
+        slopes = [
+            [(a - b) / span for a, b in zip(*ends, strict=True)] for ends, span in zip(steps, high - low, strict=True)
+        ]
+        self._parts = [(part, np.column_stack(columns)) for part, *columns in zip(rest, *slopes, strict=True)]
+
+    def split(self, x: Array) -> list[ComplexArray]:
+        return [part + slope @ (x - self._middle) for part, slope in self._parts]
 
 
 def _fitted(model: _Model, deviations: Array, starts: Sequence[Array], low: Array, high: Array) -> Array:
