@@ -320,8 +320,5 @@ def layouts_module() -> str:
     )
 
 
-def texts() -> dict[Path, str]:
-    """Return the texts of the files that are made of the schema."""
-    return {
-        GOALS: goals_module(), TABLES: tables_module(), PARTS: parts_module(), LAYOUT_CALLS: layouts_module(),
-    }  # fmt: skip
+MAKERS = {GOALS: goals_module, TABLES: tables_module, PARTS: parts_module, LAYOUT_CALLS: layouts_module}
+"""Functions that return the text of each file that is made of the schema."""

@@ -261,7 +261,7 @@ if __name__ == "__main__":
     for name, text in zip(ready.SCHEMAS, (schema(), study_schema()), strict=True):
         (FOLDER / name).write_text(text, encoding="utf-8")
     # this file is imported there by its name
-    from python_tables import texts
+    from python_tables import MAKERS
 
-    for path, text in texts().items():
-        path.write_text(text, encoding="utf-8")
+    for path, make in MAKERS.items():
+        path.write_text(make(), encoding="utf-8")

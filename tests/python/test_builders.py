@@ -147,10 +147,10 @@ def test_a_ready_problem_in_code_is_that_of_its_file(name: str, monkeypatch: pyt
         same(laufruhe.load(made.to_toml()), read)
 
 
-@pytest.mark.parametrize("path", python_tables.texts(), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", python_tables.MAKERS, ids=lambda path: path.stem)
 def test_functions_are_those_of_the_models(path: Any) -> None:
     """`python tests/schemas.py` makes them."""
-    assert path.read_text(encoding="utf-8") == python_tables.texts()[path]
+    assert path.read_text(encoding="utf-8") == python_tables.MAKERS[path]()
 
 
 def models() -> dict[str, tuple[Place, set[str]]]:

@@ -48,7 +48,7 @@ def read(tmp_path: Path) -> Callable[..., Problem]:
     return of
 
 
-@pytest.mark.parametrize("seed", first_fast([2, 25, 4, 11, *sorted({*range(100)} - {2, 4, 11, 25})], 2, 4))
+@pytest.mark.parametrize("seed", first_fast([2, 25, 11, *sorted({*range(100)} - {2, 11, 25})], 2, 3))
 def test_brute_force_finds_no_better_combination(seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The value is the least of all combinations, and no bound is above it, whenever the search stops."""
     scene = random_scene(seed)
