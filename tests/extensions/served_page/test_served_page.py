@@ -428,7 +428,7 @@ def test_a_comma_is_a_decimal_sign(shown: Page) -> None:
         assert shown.evaluate("name => laufruhePage.state.edits.get(name)[2]", MASS) == f"{taken} kg"
 
 
-def test_what_can_be_read_in_two_ways_or_in_none_is_refused_by_a_line(shown: Page) -> None:
+def test_ambiguous_and_unreadable_numbers_are_refused(shown: Page) -> None:
     value = settled(shown)
     for text, said in (
         ("1,500", '"1,500" can be read as 1500 or as 1.500'), ("2..5", '"2..5" is no number'),
