@@ -98,7 +98,7 @@ def address(file: Path) -> Iterator[str]:
 
 
 @pytest.fixture
-def shown(still: Page, address: str) -> Page:
+def problem_page(still: Page, address: str) -> Page:
     """Return the page as it is loaded; one of the same address keeps its process, which takes long to start."""
     is_loaded = still.url.partition("#")[0] == address.partition("#")[0]
     still.goto(address)
@@ -144,9 +144,9 @@ def solved(path: Path, **values: str) -> float:
 
 
 def test_the_optimum_follows_a_limit_is_proven_when_it_rests_and_is_saved(
-    shown: Page, file: Path, tmp_path: Path
+    problem_page: Page, file: Path, tmp_path: Path
 ) -> None:
-    free = settled(shown)
+    free = settled(problem_page)
     assert free == pytest.approx(solved(file), rel=1e-6)
     # the proven answer soon replaces the estimate, so the page itself notes the estimate
     problem_page.evaluate(CLAIMS)
@@ -160,10 +160,10 @@ def test_the_optimum_follows_a_limit_is_proven_when_it_rests_and_is_saved(
     assert tight > 1.5 * free
     expect(problem_page.locator("#claim")).to_contain_text("proven: no design has less than")
     # weights have moved to that design, and the page's own sum of it is that value
-    shows(shown, tight, 1e-4)
-    expect(shown.locator(f'.control:has([data-control="{MASS}"]) .said')).to_contain_text("N per kg")
-    with shown.expect_download() as download:
-        shown.locator("#save").click()
+    shows(problem_page, tight, 1e-4)
+    expect(problem_page.locator(f'.control:has([data-control="{MASS}"]) .said')).to_contain_text("N per kg")
+    with problem_page.expect_download() as download:
+        problem_page.locator("#save").click()
     path = tmp_path / download.value.suggested_filename
     download.value.save_as(path)
     found = laufruhe.evaluate(path).objective
@@ -222,29 +222,29 @@ def test_a_visitor_without_the_token_gets_a_message(page: Page, address: str) ->
     other.close()
 
 
-def test_refused_settings_keep_the_last_valid_result_and_mark_it(shown: Page) -> None:
-    value = settled(shown)
-    figure = shown.locator('[data-number-of="engine.rod_ratio"]')
+def test_refused_settings_keep_the_last_valid_result_and_mark_it(problem_page: Page) -> None:
+    value = settled(problem_page)
+    figure = problem_page.locator('[data-number-of="engine.rod_ratio"]')
     figure.fill("1.4")
     figure.press("Enter")
-    expect(shown.locator("#complaint")).to_contain_text("engine.rod_ratio")
-    expect(shown.locator("#claim")).to_contain_text("Last valid settings: Optimum")
-    expect(shown.locator("[data-role=regret]")).to_have_text("Last valid settings; the new ones are refused.")
-    assert float(shown.locator("#claim").get_attribute("data-value") or "nan") == value
+    expect(problem_page.locator("#complaint")).to_contain_text("engine.rod_ratio")
+    expect(problem_page.locator("#claim")).to_contain_text("Last valid settings: Optimum")
+    expect(problem_page.locator("[data-role=regret]")).to_have_text("Last valid settings; the new ones are refused.")
+    assert float(problem_page.locator("#claim").get_attribute("data-value") or "nan") == value
     figure.fill("0.27")
     figure.press("Enter")
     expect(problem_page.locator("#complaint")).to_be_hidden()
     assert settled(problem_page) > 0.0
 
 
-def test_two_designs_stand_side_by_side(shown: Page) -> None:
-    first = settled(shown)
-    shown.locator("#keep").click()
-    assert serious(shown) == []
-    slide(shown, MASS, 0.5)
-    second = settled(shown)
-    shows(shown, second, 1e-4)
-    row = shown.locator("#compared tr").nth(1).inner_text()
+def test_two_designs_stand_side_by_side(problem_page: Page) -> None:
+    first = settled(problem_page)
+    problem_page.locator("#keep").click()
+    assert serious(problem_page) == []
+    slide(problem_page, MASS, 0.5)
+    second = settled(problem_page)
+    shows(problem_page, second, 1e-4)
+    row = problem_page.locator("#compared tr").nth(1).inner_text()
     a, b = re.findall(r"([\d.]+) N", row)
     assert (float(a), float(b)) == pytest.approx((first, second), rel=1e-3)
     assert problem_page.locator("#kept svg").count() >= 3
@@ -379,17 +379,17 @@ def test_a_crank_is_clicked_and_given_back_and_a_ranking_says_what_it_is_about(p
         expect(said).to_have_text("Best cranks found, each with its best values of all other open numbers:")
 
 
-def test_claims_of_earlier_settings_are_marked_in_the_moment_a_slider_moves(shown: Page) -> None:
-    assert shown.locator("#claim").inner_text().startswith("Optimum ")
+def test_claims_of_earlier_settings_are_marked_in_the_moment_a_slider_moves(problem_page: Page) -> None:
+    assert problem_page.locator("#claim").inner_text().startswith("Optimum ")
     for control, values in ((MASS, (0.5, 3.0)), ("operating_points.1.speed", (2600.0, 3000.0))):
         for value in values:
-            seen = shown.evaluate(AT_ONCE, [control, value])
+            seen = problem_page.evaluate(AT_ONCE, [control, value])
             assert seen["isEarlier"]
             assert seen["text"].startswith("Earlier settings: ")
             assert seen["card"].startswith("Earlier settings; ")
-        settled(shown)
-        assert shown.locator("#claim").inner_text().startswith("Optimum ")
-        assert "proven optimum" in shown.locator("[data-role=regret]").inner_text()
+        settled(problem_page)
+        assert problem_page.locator("#claim").inner_text().startswith("Optimum ")
+        assert "proven optimum" in problem_page.locator("[data-role=regret]").inner_text()
 
 
 def test_no_claim_is_shown_for_settings_that_it_is_not_about(problem_page: Page) -> None:
@@ -422,24 +422,24 @@ def typed(page: Page, text: str) -> Locator:
     return figure
 
 
-def test_a_comma_is_a_decimal_sign(shown: Page) -> None:
+def test_a_comma_is_a_decimal_sign(problem_page: Page) -> None:
     for text, taken in (("2,5", "2.5"), ("3", "3"), ("2.5", "2.5"), (",5", "0.5"), ("0,125", "0.125")):
-        expect(typed(shown, text)).to_have_value(taken)
-        assert shown.evaluate("name => laufruhePage.state.edits.get(name)[2]", MASS) == f"{taken} kg"
+        expect(typed(problem_page, text)).to_have_value(taken)
+        assert problem_page.evaluate("name => laufruhePage.state.edits.get(name)[2]", MASS) == f"{taken} kg"
 
 
-def test_ambiguous_and_unreadable_numbers_are_refused(shown: Page) -> None:
-    value = settled(shown)
+def test_ambiguous_and_unreadable_numbers_are_refused(problem_page: Page) -> None:
+    value = settled(problem_page)
     for text, said in (
         ("1,500", '"1,500" can be read as 1500 or as 1.500'), ("2..5", '"2..5" is no number'),
         ("2 kg", '"2 kg" is no number'), ("", '"" is no number'), ("1,5,0", '"1,5,0" is no number'),
     ):  # fmt: skip
-        figure = typed(shown, text)
-        expect(shown.locator("#complaint")).to_contain_text(said)
-        expect(shown.locator("#complaint")).to_contain_text("It stays at 4 kg")
+        figure = typed(problem_page, text)
+        expect(problem_page.locator("#complaint")).to_contain_text(said)
+        expect(problem_page.locator("#complaint")).to_contain_text("It stays at 4 kg")
         expect(figure).to_have_attribute("aria-invalid", "true")
-        assert shown.evaluate("laufruhePage.state.edits.size") == 0
-        assert settled(shown) == value
+        assert problem_page.evaluate("laufruhePage.state.edits.size") == 0
+        assert settled(problem_page) == value
 
 
 def test_a_broken_limit_is_marked_as_soon_as_the_slider_has_moved(page: Page) -> None:
