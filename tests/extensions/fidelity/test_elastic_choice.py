@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fidelity.scenes import finer, random_elastic_problem
-from fidelity.test_elastic import held, stiffer
+from fidelity.test_elastic import on_given_mounts, stiffer
 from lanes import first_fast
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.extensions.fidelity.choice import choose
@@ -82,7 +82,7 @@ READY = [(path, tolerance) for path in ELASTIC for tolerance in (1e-1, 1e-3)]
 
 @pytest.mark.parametrize(("path", "tolerance"), first_fast(READY, 4, long=READY[5::4] + READY[6::4]), ids=_name)
 def test_automatic_on_ready_engines(path: Path, tolerance: float) -> None:
-    _keeps_its_word(replace(held(path), decisions=()), tolerance)
+    _keeps_its_word(replace(on_given_mounts(path), decisions=()), tolerance)
 
 
 @pytest.mark.parametrize("seed", first_fast(range(AUTOMATIC), 4, 5))
@@ -117,7 +117,7 @@ def test_modes_and_motion_are_really_dropped() -> None:
         if not missing:
             break
     assert not missing
-    symmetric = choose(replace(held(PROBLEMS / "study-soft-mounts.toml"), decisions=()), 1e-3)
+    symmetric = choose(replace(on_given_mounts(PROBLEMS / "study-soft-mounts.toml"), decisions=()), 1e-3)
     assert any("nothing excites them" in part.why for part in symmetric.left_out)
 
 
@@ -154,7 +154,7 @@ def test_a_transmissibility_needs_its_loads(damped: dict[str, Any]) -> None:
 
 
 def test_stiff_mounts_are_rigid_ones() -> None:
-    problem = replace(held(PROBLEMS / "tractor-four-elastic.toml"), decisions=())
+    problem = replace(on_given_mounts(PROBLEMS / "tractor-four-elastic.toml"), decisions=())
     assert choose(replace(problem, engine=stiffer(problem.engine, 1e7)), 1e-2).fidelity.mounts == "rigid"
 
 
