@@ -34,6 +34,8 @@ class Extension:
     ----------
     name
         Name of the package in messages.
+    needs
+        Names of all extensions whose modules its own import; it is left out without them.
     norms
         Subclasses of `laufruhe.numerics.norms.Norm`.
     channels
@@ -78,6 +80,7 @@ class Extension:
     """
 
     name: str
+    needs: tuple[str, ...] = ()
     norms: tuple[str, ...] = ()
     channels: tuple[str, ...] = ()
     dependences: tuple[str, ...] = ()
@@ -109,6 +112,10 @@ _OF_PISTONS = (
     "piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle",
     "side-force reversal rate",
 )  # fmt: skip
+_OF_BEARINGS = (
+    "main-bearing force", "main-bearing pressure", "hammer blow", "friction power", "crank-pin force",
+    "crank-pin pressure", "side force", "rod force",
+)  # fmt: skip
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {
@@ -138,6 +145,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "trade": "fidelity",
     },
     "keys": {
+        "main_bearings": "bearing_loads",
         "torsion": "torsion",
         "tolerances": "robust",
         "robust": "robust",
@@ -163,6 +171,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "layouts": {"delta": "delta", "rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker", "rhombic": "rhombic"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
+    | dict.fromkeys(_OF_BEARINGS, "bearing_loads")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")
     | dict.fromkeys(_OF_PISTONS, "piston_motion")
     | dict.fromkeys(("shaft distance", "shaft clearance", "envelope radius"), "open_positions")
@@ -174,7 +183,9 @@ INSTALL = "install laufruhe with all its folders"
 
 def missing_extension(extension: str) -> tuple[str, str]:
     """Return rule and remedy for a file that needs an extension of this package that is not installed."""
-    return f"needs the extension '{extension}', which is not installed", INSTALL
+    names = {one.name for one in extensions()}
+    needs = (need for one in _all_extensions() if one.name == extension for need in one.needs if need not in names)
+    return f"needs the extension '{next(needs, extension)}', which is not installed", INSTALL
 
 
 def is_installed(extension: str) -> bool:
@@ -193,6 +204,12 @@ def object_at(address: str) -> Any:
 @cache
 def extensions() -> tuple[Extension, ...]:
     """Return the extensions of this package, then those of other packages, each in alphabetical order."""
+    names = {one.name for one in _all_extensions()}
+    return tuple(one for one in _all_extensions() if names.issuperset(one.needs))
+
+
+@cache
+def _all_extensions() -> tuple[Extension, ...]:
     folders = iter_modules([str(Path(__file__).with_name("extensions"))])
     addresses = [(extension.name, f"laufruhe.extensions.{extension.name}:EXTENSION") for extension in folders]
     addresses += sorted((point.name, point.value) for point in entry_points(group=GROUP))

@@ -21,10 +21,12 @@ from bench_multibody import STEPS, Scene, scene
 from pages import PAGES, ROOT, publish, spent
 
 import laufruhe
-from laufruhe.machine import Bearing, Engine
+from laufruhe.extensions.bearing_loads.channels import CRANK_PIN_FORCE, MAIN_BEARING_FORCE
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings
+from laufruhe.extensions.bearing_loads.physics import main_bearing_forces
+from laufruhe.machine import Engine
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.bearing_loads import main_bearing_forces
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate
@@ -34,7 +36,7 @@ from laufruhe.problem.problem import Problem
 OUT = PAGES / "bearings.md"
 PROBLEMS = ROOT / "problems"
 REPEATS, DESIGNS, SAMPLES, TARGET = 5, 40, 720, 1e-5
-FORCES: Sequence[LoadChannel] = (channels.MOUNT_FORCE, channels.MAIN_BEARING_FORCE, channels.CRANK_PIN_FORCE)
+FORCES: Sequence[LoadChannel] = (channels.MOUNT_FORCE, MAIN_BEARING_FORCE, CRANK_PIN_FORCE)
 
 
 def per_design(problem: Problem, channel: LoadChannel | None) -> float:
@@ -94,7 +96,7 @@ def carried(four: Scene) -> Spectrum:
     parts = four.engine.slider_cranks
     ends = max(part.x for part in parts) + 0.06, min(part.x for part in parts) - 0.06
     bearings = tuple(Bearing(str(k), x) for k, x in enumerate(np.linspace(*ends, 5)))
-    return main_bearing_forces(replace(four.engine, bearings=bearings), four.point)
+    return main_bearing_forces(four.engine.with_extra(MainBearings(bearings)), four.point)
 
 
 def simulated_error(four: Scene, steps: int) -> float:

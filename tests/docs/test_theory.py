@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from laufruhe.extensions.bearing_loads.physics import beam_shares, lever_shares
 from laufruhe.extensions.torsion.machine import Disc, ShaftSection, Torsion
 from laufruhe.extensions.torsion.physics import critical_speed, natural_modes
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank
-from laufruhe.physics.bearing_loads import beam_shares, lever_shares
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import swing_of, torque_facts

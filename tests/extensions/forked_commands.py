@@ -43,14 +43,17 @@ def redirect(stream: int, file: Path) -> None:
 
 
 def run_copy(folder: Path, commands: list[list[str]]) -> None:
-    """Import every module of a copy, then run each command."""
+    """Import every module of a copy, except those of extensions without others that they need; run each command."""
     redirect(2, folder / "import.err")
     sys.path.insert(0, str(folder))
     import laufruhe
+    from laufruhe.extension import extensions
 
+    present = {one.name for one in extensions()}
     assert Path(laufruhe.__file__).parent == folder / "laufruhe"
     for module in pkgutil.walk_packages(laufruhe.__path__, "laufruhe."):
-        if module.name != "laufruhe.__main__":
+        _, room, own, *_ = [*module.name.split("."), "", ""]
+        if module.name != "laufruhe.__main__" and (room != "extensions" or own in {"", *present}):
             importlib.import_module(module.name)
     for k, words in enumerate(commands):
         status = forked(lambda words=words, k=k: run_command(words, folder / str(k)))

@@ -33,6 +33,7 @@ MAIN = "tractor-four-lanchester"
 STUDY = 'title = "t"\n[study]\n[[study.parts]]\nkind = "{}"\nname = "n"\ntitle = "t"\ncases = []\n'
 # one entry of each table and extension stands for all
 NEEDS = list({(table, home): (table, name) for table, homes in HOMES.items() for name, home in homes.items()}.values())
+ON = {one.name: one.needs for one in extension.extensions() if one.needs}
 ORDERED = [
     ("methods", Method, methods._CORE),
     ("reductions", methods.Reduction, methods.REDUCTIONS),
@@ -77,7 +78,14 @@ def commands_without(names: Sequence[str], folder: Path) -> list[list[str]]:
 
 
 def lacking(names: Sequence[str]) -> list[tuple[Tables, str]]:
-    return [(table, entry) for table, entry in NEEDS if HOMES[table][entry] in names]
+    """Return the entries that these extensions have, or others that build on these."""
+    return [(table, entry) for table, entry in NEEDS if missing(table, entry, names)]
+
+
+def missing(table: Tables, entry: str, names: Sequence[str]) -> str:
+    """Return the extension whose absence refuses an entry; empty if it is there."""
+    home = HOMES[table][entry]
+    return next((name for name in (home, *ON.get(home, ())) if name in names), "")
 
 
 @pytest.fixture(scope="module")
@@ -114,13 +122,13 @@ def test_every_home_is_there() -> None:
 
 
 def test_nothing_imports_an_extension_of_others_as_it_is_imported() -> None:
-    """A copy without one extension then imports as the copy without all of them does."""
+    """A copy without one extension then imports as the copy without all of them does; `needs` go together."""
     for path in SOURCE.rglob("*.py"):
         room, own, *_ = [*path.relative_to(SOURCE).parts, ""]
         names = re.findall(
             r"^(?:from|import) laufruhe\.extensions\.(\w+)", path.read_text(encoding="utf-8"), re.MULTILINE
         )
-        assert set(names) <= ({own} if room == "extensions" else set()), path
+        assert set(names) <= ({own, *ON.get(own, ())} if room == "extensions" else set()), path
 
 
 @pytest.mark.parametrize("name", EXTENSIONS)
@@ -159,4 +167,4 @@ def test_the_core_runs_without_extensions(names: list[str], answers: Callable[[S
         refused = answer_of(folder, k)
         assert refused.status == 2, refused.error
         (line,) = refused.error.strip().splitlines()
-        assert f"needs the extension '{HOMES[table][name]}'" in line
+        assert f"needs the extension '{missing(table, name, names)}'" in line

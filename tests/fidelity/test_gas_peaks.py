@@ -14,10 +14,11 @@ import pytest
 import laufruhe
 from fidelity.scenes import random_problem
 from lanes import first_fast
+from laufruhe.extensions.bearing_loads.channels import CRANK_PIN_FORCE
+from laufruhe.extensions.bearing_loads.physics import pin_forces
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.machine import GasModel, Seiliger, SliderCrank, Wiebe
 from laufruhe.numerics.norms import NORMS, Grid
-from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem import channels
@@ -183,7 +184,7 @@ def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
     result = problem_of_peak(seed)
     point = replace(result.points[0], gas=_gas(rng))
     problem = replace(
-        result, points=(point,), objective=(Term(Measure(channels.CRANK_PIN_FORCE, NORMS["maximum"])),),
+        result, points=(point,), objective=(Term(Measure(CRANK_PIN_FORCE, NORMS["maximum"])),),
         fidelity=replace(result.fidelity, samples=1440),
     )  # fmt: skip
     evaluation = evaluate(problem)

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from laufruhe.extensions.bearing_loads.physics import pin_forces
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.files.reader import load
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Rod, SliderCrank
 from laufruhe.machine import kinematics as slider_crank
 from laufruhe.machine.gas.base import AMBIENT_PRESSURE
 from laufruhe.machine.layouts import build, even_throws, inline
-from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from mechanisms import mechanism_of

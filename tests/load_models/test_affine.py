@@ -11,9 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from laufruhe.extensions.bearing_loads.channels import BEARINGS, MAIN_BEARING_FORCE
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings
 from laufruhe.extensions.sizes.machine import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.load_models.affine import AffineModel, AffineProblem
-from laufruhe.machine import Bearing, OperatingPoint
+from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.norms import NORMS, Grid, lengths
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel, MassChannel
@@ -28,7 +30,7 @@ from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 ALL_LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel))
 LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and c.is_block_load)
 # twist needs discs and shafts, and is tested with them
-OF_CRANKCASE = (channels.Needs.UNCONDITIONAL, channels.Needs.BEARINGS)
+OF_CRANKCASE = (channels.Needs.UNCONDITIONAL, BEARINGS)
 INSIDE = tuple(
     Measure(c, NORMS[norm]) for c in ALL_LOADS if c.needs in OF_CRANKCASE and not c.is_block_load for norm in c.norms
 )
@@ -165,7 +167,7 @@ def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) 
             np.testing.assert_allclose(result, period.reshape(result.shape), rtol=0.0, atol=1e-11 * size)
         assert norm.value(x) == pytest.approx(expected.value, rel=1e-11)
     acts = [np.abs(norm.slope).max() for measure, (_, norm) in zip(INSIDE, affine.terms, strict=True)
-            if measure.channel is channels.MAIN_BEARING_FORCE]  # fmt: skip
+            if measure.channel is MAIN_BEARING_FORCE]  # fmt: skip
     assert min(acts) > 0.0
 
 
@@ -178,7 +180,7 @@ def inside() -> tuple[Problem, AffineModel, AffineProblem]:
     gear = RunningGear(
         webs=Webs(0.08, 0.02), rod=Shank(0.022), piston_pin=PistonPin(0.028, 0.016, 0.07), bolts=Bolts(2, 0.008)
     )
-    engine = replace(whole.engine, slider_cranks=parts, bearings=bearings, extras=(gear,))
+    engine = replace(whole.engine, slider_cranks=parts, extras=(gear, MainBearings(bearings)))
     own = replace(whole, engine=engine, objective=tuple(Term(measure) for measure in INSIDE))
     model = AffineModel(own)
     return own, model, model.at(96)

@@ -10,7 +10,8 @@ from fractions import Fraction
 import pytest
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import CRANKSHAFT, Bearing, Cycle, Engine, Mount, Rotor, Shaft, SliderCrank
+from laufruhe.extensions.bearing_loads.machine import Bearing
+from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, Rotor, Shaft, SliderCrank
 from laufruhe.machine.dynamic import FluidTrack
 
 PART = SliderCrank("cylinder 1", 0.0, 0.06, 0.2, 1.0)

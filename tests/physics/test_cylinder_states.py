@@ -11,9 +11,9 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.bearing_loads.physics import pin_forces
 from laufruhe.machine import Cycle, Seiliger, SliderCrank
 from laufruhe.machine.gas.base import CylinderGases
-from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque, cylinder_torque, torque_facts, turning_torque

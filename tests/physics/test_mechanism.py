@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.bearing_loads.physics import piston_pin_forces
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Shaft, SliderCrank
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics import mechanism
-from laufruhe.physics.bearing_loads import piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.torque import crank_torque
 from one_cylinder import inertia_coefficients

@@ -9,7 +9,7 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError
-from laufruhe.physics.bearing_loads import hammer_blows
+from laufruhe.extensions.bearing_loads.physics import hammer_blows
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.problem import Problem
 from laufruhe.report.wording import headline

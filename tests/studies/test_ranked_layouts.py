@@ -12,9 +12,10 @@ import pytest
 import xarray as xr
 
 import laufruhe
+from laufruhe.extensions.bearing_loads.machine import bearings_of
+from laufruhe.extensions.bearing_loads.physics import main_bearing_forces, pin_forces
 from laufruhe.extensions.sweeps.layout_comparison import LayoutComparison, _places
 from laufruhe.files.reader import load_tables
-from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
 from laufruhe.plots.picture import draw
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
@@ -107,7 +108,7 @@ def test_the_ready_study_has_every_layout_from_one_to_twelve_cylinders() -> None
     assert len(engines) == 33
     assert {case.equal_power_to for case in part.cases} == {4}
     assert part.further == FURTHER
-    assert all(len(engine.bearings) > 1 for engine in engines)
+    assert all(len(bearings_of(engine)) > 1 for engine in engines)
     power = [sum(p.piston_area * p.crank_radius for p in e.slider_cranks) for e in engines]
     speeds = [problem_files.problem(point).points[0].speed for point in part.points(problem_files)]
     assert np.array(power) * np.array(speeds) == pytest.approx(power[3] * speeds[3])

@@ -20,10 +20,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings
+from laufruhe.extensions.bearing_loads.physics import main_bearing_forces
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
-from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Role, Rotor, Shaft, SliderCrank
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Rod, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.rotor import CRANKSHAFT
-from laufruhe.physics.bearing_loads import main_bearing_forces
 from laufruhe.physics.shaking_loads import shaking_loads
 from validation import multibody
 from validation.multibody import ConnectingRod, Cylinder, Loads, Machine, Turning
@@ -311,7 +312,7 @@ def in_bearings(case: Case, steps: int) -> NDArray[np.complex128]:
         here = [part for part in case.engine.slider_cranks if (part.shaft, part.x) == (shaft, body.x)]
         rotors = tuple(r for r in case.engine.rotors if (r.shaft, r.x) == (shaft, body.x))
         bearings = tuple(Bearing(str(side), body.x + 0.03 * side, shaft=shaft) for side in (-1, 1))
-        alone = replace(case.engine, slider_cranks=tuple(here), rotors=rotors, bearings=bearings)
+        alone = replace(case.engine, slider_cranks=tuple(here), rotors=rotors).with_extra(MainBearings(bearings))
         values = main_bearing_forces(alone, case.point).values(angles).sum(axis=1)
         forces.append(values[:, 2] + 1j * values[:, 1])
     return np.stack(forces, axis=1)

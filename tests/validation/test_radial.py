@@ -22,11 +22,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from laufruhe.errors import InputError
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings
+from laufruhe.extensions.bearing_loads.physics import crank_forces, main_bearing_forces, pin_forces, piston_pin_forces
 from laufruhe.files.reader import load
-from laufruhe.machine import Bearing, Engine, OperatingPoint, Seiliger, SliderCrank
+from laufruhe.machine import Engine, OperatingPoint, Seiliger, SliderCrank
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.machine.scaling import scale_part
-from laufruhe.physics.bearing_loads import crank_forces, main_bearing_forces, pin_forces, piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import (
     reciprocating_loads,
@@ -225,7 +226,7 @@ def test_gas_reaches_pins_and_walls_through_the_master_rod(five: Problem) -> Non
 
 
 def carried(engine: Engine) -> Engine:
-    return replace(engine, bearings=(Bearing("front", 0.15), Bearing("rear", -0.05)))
+    return engine.with_extra(MainBearings((Bearing("front", 0.15), Bearing("rear", -0.05))))
 
 
 def test_rods_on_one_pin_press_it_as_hinged_ones_close_to_it(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from laufruhe.cli.screen import complain, is_quiet
 from laufruhe.errors import printed
 from laufruhe.files.reader import load
 from laufruhe.present.gas_figures import gas_lines
-from laufruhe.present.measures import pin_note
+from laufruhe.present.measures import displayed_loads
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -35,7 +35,8 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
 
     machine = drawing.engine.load_torque
     loads = [f"load: {sentence}" for sentence in machine.recording] if machine else []
-    loads += [f"pins: {note}" for note in [pin_note(drawing)] if note]
+    notes = {load.display.note(drawing): load for load in reversed(displayed_loads(drawing))}
+    loads += [f"{load}: {note}" for note, load in notes.items() if note]
 
     def initial_as_json() -> str:
         from laufruhe.report.json_result import as_json

@@ -63,10 +63,10 @@ def drawing(ask: Ask, result: Result, folder: Path, kinds: Sequence[str]) -> Cal
     from laufruhe.problem.evaluation import place_measures
 
     # both processes need these measures, and the copy has what is computed
-    for places in places_of(result):
+    for load in places_of(result):
         for design in evaluations_with_loads(result):
             for k in range(len(design.loads)):
-                place_measures(design, k, places.channel)
+                place_measures(design, k, load)
     # functions that read and solve have no pickle
     problem = replace(result.problem, origin=None)
     if problem.phasing is not None:

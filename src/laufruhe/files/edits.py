@@ -197,8 +197,6 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
             yield from key.numbers(tables[name])
     for k, geared in enumerate(tables.get("geared_inertias", ())):
         yield geared.get("name", ""), ("geared_inertias", k)
-    for k, bearing in enumerate(tables.get("main_bearings", ())):
-        yield bearing.get("name", str(k + 1)), ("main_bearings", k)
     for k, place in enumerate(tables.get("mounts", {}).get("places", ())):
         yield place.get("name", str(k + 1)), ("mounts", "places", k)
 

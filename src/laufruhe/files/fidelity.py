@@ -77,7 +77,7 @@ def _refusal(problem: Problem, key: str, value: Any) -> tuple[str, str] | None:
     engine = problem.engine
     if key == "gas_orders" and all(point.gas is None for point in problem.points):
         return "needs working gas", "leave it out, or add [gas]"
-    if key == "crankshaft" and not engine.bearings:
+    if key == "crankshaft" and not engine.supports:
         return "needs main bearings", "leave it out, or list them"
     if key not in ("mounts", "modes") or value == EXACT.mounts:
         return None

@@ -180,7 +180,7 @@ class MeasureContext:
         if measure.is_mass:
             self._check_masses(measure, names, key)
         elif "of" in channel.keys:
-            _check_known(names, channel.places(self.engine), f"{key}.of", channel.place)
+            _check_known(names, channel.places(self.engine), f"{key}.of", channel.display.place)
         return measure
 
     def _check_keys(self, channel: Channel, table: QuantityTable, where: str) -> None:

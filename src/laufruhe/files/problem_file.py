@@ -12,7 +12,6 @@ from pydantic import Field, create_model
 
 from laufruhe.extension import extended
 from laufruhe.files import fields as f
-from laufruhe.files.bearings import MainBearingTable
 from laufruhe.files.complaints import si_value
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
@@ -27,7 +26,7 @@ from laufruhe.files.operating_points import FrictionTable, OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.quantities import QuantitiesTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable, UnbalanceTable
-from laufruhe.machine import Bearing, SliderCrank
+from laufruhe.machine import SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.problem.problem import Problem
 
@@ -76,7 +75,7 @@ class Key:
     single
         True if it requires a single objective.
     adds
-        Function of table, slider-cranks, throws and bearings that returns slider-cranks and throws with its additions,
+        Function of table, slider-cranks, throws and file that returns slider-cranks and throws with its additions,
         before rotors are placed.
     always
         True if `read` is called without the table too, and before other keys, to find open numbers in other tables.
@@ -87,7 +86,7 @@ class Key:
     read: Callable[[Any, Problem, ExtensionContext], Problem]
     numbers: Callable[[Any], Iterable[tuple[str, Place]]] = lambda _: ()
     single: bool = False
-    adds: Callable[[Any, Cylinders, Throws, tuple[Bearing, ...]], tuple[Cylinders, Throws]] = lambda _, c, t, __: (c, t)
+    adds: Callable[[Any, Cylinders, Throws, ProblemFile], tuple[Cylinders, Throws]] = lambda _, c, t, __: (c, t)
     always: bool = False
 
 
@@ -191,7 +190,6 @@ class ProblemFile(Table):
     mounts: MountsTable | None = None
     block: BlockTable | None = None
     load_cases: list[LoadCaseTable] = Field(default_factory=list)
-    main_bearings: list[MainBearingTable] = Field(default_factory=list)
     load_torque: LoadTorqueTable | None = None
     flywheel: FlywheelTable | None = None
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)

@@ -18,7 +18,6 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError, ModelError, printed, refused, wrong_call
 from laufruhe.extension import extended
 from laufruhe.files import edits, open_numbers
-from laufruhe.files.bearings import bearings_of, expand_bearings
 from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import (
     MAX_COMPLAINTS,
@@ -312,11 +311,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     """Return the problem of a file with this table [engine], which has no open throws, firing order or bank angles."""
     needs_bore = file.gas is not None and file.gas.acts_on_bore and any(point.gas for point in file.operating_points)
     cylinders, throws = moving_parts(table, gas=needs_bore)
-    bearings = bearings_of(expand_bearings(file.main_bearings, throws), cylinders)
     keys = sorted(EXTENSION_KEYS.values(), key=lambda key: not key.always)
     for key in keys:
         if (key_table := getattr(file, key.name)) is not None:
-            cylinders, throws = key.adds(key_table, cylinders, throws, bearings)
+            cylinders, throws = key.adds(key_table, cylinders, throws, file)
     for weight_key in WEIGHT_KEYS.values():
         file = weight_key.prepare(file)
     collected = RotorList(rotors=list(throw_rotors(throws)))
@@ -338,7 +336,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         points = tuple(replace(point, gas=None) for point in points)
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, bearings, wheel,
+        file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, wheel,
         geared, load_cases_of(file.load_cases, on_mounts.block),
         load_torque=load_torque_of(file.load_torque, path.parent, cycle, cylinders), gravity=table.gravity,
     )  # fmt: skip

@@ -10,13 +10,12 @@ from laufruhe.machine.gas.seiliger import Seiliger
 from laufruhe.machine.gas.wiebe import Wiebe
 from laufruhe.machine.load_torque import LoadTorque
 from laufruhe.machine.mount import Mount
-from laufruhe.machine.rotor import CRANKSHAFT, Bearing, GearedInertia, Role, Rotor, Shaft
+from laufruhe.machine.rotor import CRANKSHAFT, GearedInertia, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
 
 __all__ = [
     "CRANKSHAFT",
     "Arms",
-    "Bearing",
     "Block",
     "Charge",
     "Cycle",

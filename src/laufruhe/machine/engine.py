@@ -19,7 +19,7 @@ from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.load_torque import LoadTorque
 from laufruhe.machine.mount import Mount
-from laufruhe.machine.rotor import Bearing, GearedInertia, Rotor, Shaft
+from laufruhe.machine.rotor import GearedInertia, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.numerics.exact_angles import as_turn, cis, direction, reduced_turn
 from laufruhe.numerics.spectrum import as_order
@@ -93,8 +93,6 @@ class Engine:
         Mounts; empty if only shaking loads are requested.
     block
         Body that elastic mounts carry; None for rigid mounts.
-    bearings
-        Main bearings of its shafts; empty if no measure refers to them.
     flywheel
         Parts that turn with the crank; None if no measure refers to them.
     geared
@@ -115,7 +113,6 @@ class Engine:
     rotors: tuple[Rotor, ...] = ()
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
-    bearings: tuple[Bearing, ...] = ()
     flywheel: Flywheel | None = None
     geared: tuple[GearedInertia, ...] = ()
     load_cases: tuple[LoadCase, ...] = ()
@@ -124,7 +121,7 @@ class Engine:
     gravity: bool = False
 
     def __post_init__(self) -> None:
-        for kind in ("slider_cranks", "rotors", "mounts", "bearings", "geared"):
+        for kind in ("slider_cranks", "rotors", "mounts", "geared"):
             names = [part.name for part in getattr(self, kind)]
             if len(set(names)) < len(names):
                 double = next(name for name, count in Counter(names).items() if count > 1)
@@ -155,6 +152,11 @@ class Engine:
     def with_extra(self, extra: Extra) -> Engine:
         """Return the engine with a part of an extension, which replaces a part of the same class."""
         return replace(self, extras=(*(one for one in self.extras if type(one) is not type(extra)), extra))
+
+    @property
+    def supports(self) -> Mapping[str, Sequence[float]]:
+        """Positions along x at which parts of extensions support its shafts [m], in order, by the name of the shaft."""
+        return {shaft: places for one in self.extras for shaft, places in one.supports.items()}
 
     def torques(self, point: OperatingPoint) -> tuple[MachineTorque, ...]:
         """Return the torques of machines of extensions at an operating point."""

@@ -75,6 +75,11 @@ class Extra:
         return {}
 
     @property
+    def supports(self) -> Mapping[str, Sequence[float]]:
+        """Positions along x at which it supports shafts of the engine [m], in order, by the name of the shaft."""
+        return {}
+
+    @property
     def labels(self) -> Sequence[str]:
         """Return the names that pictures may show."""
         return ()

@@ -276,7 +276,7 @@ def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) 
     """Return work and inertia over the cycle; mounts and flywheel are not part of them, rotors by their weight only."""
     rotors = engine.rotors if engine.gravity else ()
     loaded = tuple(extra for extra in engine.extras if extra.torques(point.name, engine.cycle.base_order))
-    bare = replace(engine, rotors=rotors, mounts=(), bearings=(), flywheel=None, extras=loaded, geared=())
+    bare = replace(engine, rotors=rotors, mounts=(), flywheel=None, extras=loaded, geared=())
     return _compute_swing(bare, point, fidelity)
 
 

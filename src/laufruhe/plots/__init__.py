@@ -65,7 +65,7 @@ def _words(result: Result) -> Iterator[str]:
     problem, engine = result.problem, result.final.engine
     yield from (problem.title, problem.source, problem.objective_name)
     named: list[Any] = [*problem.points, *problem.limits, *problem.decisions]
-    named += [*engine.cylinders, *engine.mounts, *engine.rotors, *engine.bearings]
+    named += [*engine.cylinders, *engine.mounts, *engine.rotors]
     yield from (part.name for part in named)
     for extra in engine.extras:
         yield from extra.labels

@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 
-from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
-from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.torque import turning_inertia
-from laufruhe.present.numbers import with_unit
-from laufruhe.problem.channels import (
-    CHANNELS,
-    CRANK_PIN_FORCE,
-    CRANK_PIN_PRESSURE,
-    FRICTION_POWER,
-    MAIN_BEARING_FORCE,
-    MOUNT_FORCE,
-    LoadChannel,
-)
-from laufruhe.problem.evaluation import Evaluation, channel_samples
+from laufruhe.problem.channels import LoadChannel, load_channels
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values
 from laufruhe.solvers.result import FINAL, INITIAL, Result
@@ -31,66 +17,15 @@ from laufruhe.solvers.stars.ranking import PhasingResult
 from laufruhe.solvers.values import LimitValue
 
 
-@dataclass(frozen=True)
-class Places:
-    """A force, or its power, shown place by place: key in `result.json`, title, first head and note of its table."""
-
-    key: str
-    channel: LoadChannel
-    title: str
-    place: str
-    note: Callable[[Problem], str] = lambda _: ""
+def places_of(result: Result) -> list[LoadChannel]:
+    """Return the loads of which a result has a table for each mount, bearing, pin or other place."""
+    return [load for load in displayed_loads(result.problem) if load.display.title]
 
 
-MOUNTS = Places("mounts", MOUNT_FORCE, "Mount forces", "mount")
-BEARINGS = Places("main_bearings", MAIN_BEARING_FORCE, "Main-bearing forces", "bearing")
-PINS = Places("crank_pins", CRANK_PIN_FORCE, "Crank-pin forces", "pin of", lambda problem: pin_note(problem))
-FRICTION = Places("friction", FRICTION_POWER, "Friction power of main bearings", "bearing")
-
-
-def places_of(result: Result) -> list[Places]:
-    """Return the quantities that a result shows for each mount, bearing, pin or other place."""
-    engine, problem = result.problem.engine, result.problem
-    titled = () if problem.fidelity.has_uneven_speed else titled_places()
-    mounts = [MOUNTS] if engine.mounts else []
-    return [
-        *mounts,
-        *_crankcase_places(problem),
-        *(one for one in titled if one.channel.needs.of(engine) and one.channel.places(engine)),
-    ]
-
-
-def _crankcase_places(problem: Problem) -> list[Places]:
-    # the requested quantities, or all if the engine has bearings
-    bearings, requested = problem.engine.bearings, {measure.channel for measure in problem.measures}
-    rubs = all(bearing.friction is not None for bearing in bearings)
-    has_data = {BEARINGS: bool(bearings), PINS: bool(bearings), FRICTION: bool(bearings) and rubs}
-    inside = has_bearing_loads(problem.engine, problem.fidelity)
-    return [
-        places for places, is_available in has_data.items() if inside and (is_available or places.channel in requested)
-    ]
-
-
-def pin_note(problem: Problem) -> str:
-    """Return a sentence on the mass whose pull the crank-pin forces include (B3); empty if no such force is shown."""
-    masses = [part.rotating_mass for part in problem.engine.slider_cranks if part.master_bank is None]
-    if not {CRANK_PIN_FORCE, CRANK_PIN_PRESSURE} & {
-        *(measure.channel for measure in problem.measures), *(places.channel for places in _crankcase_places(problem))
-    }:  # fmt: skip
-        return ""
-    if not any(masses):
-        return (
-            "Crank-pin forces have no pull of a big end, because no [engine.rod] gives its mass; rotating_mass of a "
-            "throw loads the main bearings alone."
-        )
-    masses_text = " to ".join(dict.fromkeys(with_unit(mass, "kg") for mass in (min(masses), max(masses))))
-    return f"Crank-pin forces include the pull of a rotating mass of {masses_text} at each pin."
-
-
-def titled_places() -> list[Places]:
-    """Return the loads that every report shows at their places, such as those of extensions."""
-    loads = [Measure(channel).load for channel in CHANNELS.values() if channel.title]
-    return [Places(load.name.replace(" ", "_"), load, load.title, load.place) for load in loads]
+def displayed_loads(problem: Problem) -> list[LoadChannel]:
+    """Return the loads that the results of a problem show place by place."""
+    requested = {measure.channel for measure in problem.measures}
+    return [load for load in load_channels() if load.is_displayed(problem.engine, problem.fidelity, requested)]
 
 
 def hardest_point(result: Result) -> int:
@@ -199,22 +134,6 @@ def decided_design(result: Result) -> str:
 def evaluations_with_loads(result: Result) -> list[Evaluation]:
     """Return the designs with finite loads as a list."""
     return list(designs_with_loads(result).values())
-
-
-def has_bearings(result: Result) -> bool:
-    """Return True if there are main-bearing loads to draw."""
-    return BEARINGS in places_of(result) and has_loads(result)
-
-
-def bearing_paths(design: Evaluation, k: int) -> ComplexArray:
-    """Return main-bearing forces at an operating point, upward + i leftward, shape (angles, bearings) [N]."""
-    samples = channel_samples(design, k, BEARINGS.channel)
-    return np.asarray(samples[..., 2] + 1j * samples[..., 1])
-
-
-def as_crank_turns(design: Evaluation, steps: int) -> ComplexArray:
-    """Return factors that turn forces into the frame of the crank, shape (steps,)."""
-    return np.asarray(np.exp(-1j * design.engine.cycle.angle * np.arange(steps) / steps))
 
 
 def objective_unit(result: Result) -> str:

@@ -36,7 +36,6 @@ _CAPTIONS = {
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "willans": "Fuel over brake load with the Willans line, or drag over speed; the fitted line gives the friction.",
     "torque": "Torque of gas, pistons and rods, its work and orders, and the crank speed with the flywheel.",
-    "bearings": "Force on each main bearing over a cycle, on block and crankshaft, and its wear.",
     "spectrum": "Amplitudes of the loads by order of crank speed.",
     "transmissibility": "Force on elastic mounts relative to rigid mounts, over speed.",
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",

@@ -7,7 +7,7 @@ design. Each channel lists the keys that may narrow it in a file, and the sides 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -18,7 +18,6 @@ from laufruhe.machine import Block, Engine, Flywheel, OperatingPoint, Role
 from laufruhe.machine.block import LoadCase
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics import bearing_loads as bearings
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
@@ -37,8 +36,7 @@ OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders", "alternating")
 AT_WEBS = (*ON_BLOCK, "webs")
 OF_VECTOR = (*ON_BLOCK, "direction_weights")
-AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = ((*OF_VECTOR, at) for at in ("mounts", "bearings", "cylinders"))
-OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
+AT_MOUNTS, AT_CYLINDERS, IN_CYLINDERS = (*OF_VECTOR, "mounts"), (*OF_VECTOR, "cylinders"), (*ON_BLOCK, "cylinders")
 
 
 def crankcase_signal(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
@@ -78,7 +76,6 @@ class Needs:
     UNCONDITIONAL = Need(lambda _: True, "", "")
     MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
     ELASTIC = Need(lambda e: e.block, "elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
-    BEARINGS = Need(lambda e: e.bearings, "main bearings", "list them in [[main_bearings]]")
     FLYWHEEL = Need(
         lambda e: e.flywheel or any(extra.turning_inertia(e.slider_cranks) is not None for extra in e.extras),
         "a flywheel",
@@ -91,6 +88,32 @@ class Needs:
         "add [flywheel.rim.arms]",
     )
     CASES = Need(lambda e: e.load_cases, "load cases", "add [[load_cases]], and [mounts] of kind elastic")
+
+
+@dataclass(frozen=True)
+class Display:
+    """Table and curves of a load at each of its places in results.
+
+    Attributes
+    ----------
+    title, place
+        Title of the table, empty without one, and name of a place in it and in datasets.
+    key
+        Key in `result.json`; by default the name of the channel.
+    curve
+        Words before a place in headings of curves, such as "force on"; empty without curves.
+    applies
+        Function of the engine that returns False if it is shown with a measure of it only.
+    note
+        Function of the problem that returns a note on it.
+    """
+
+    title: str = ""
+    place: str = ""
+    key: str = ""
+    curve: str = ""
+    applies: Callable[[Engine], object] = lambda _: True
+    note: Callable[[Any], str] = lambda _: ""
 
 
 _KNOWN: dict[str, Channel] = {}
@@ -138,9 +161,8 @@ class Channel:
         rotation about the axis as a natural mode.
     places
         Function of the engine that returns the names of its places; empty for loads on the block.
-    title, place
-        Title and place column of the table in every report for a load at even speed; empty if it is shown on request
-        only.
+    display
+        Its table and curves, place by place.
     linear_in
         Load of which it is a linear function at each crank angle, so that it depends on decisions as that load does.
     """
@@ -160,8 +182,7 @@ class Channel:
     simulation: str = ""
     peak_error: Callable[[Engine], float] = lambda _: 0.0
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
-    title: str = ""
-    place: str = ""
+    display: Display = Display()
     linear_in: Channel | None = None
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
@@ -243,6 +264,17 @@ class LoadChannel(Channel):
         """Raise `ModelError` if the engine lacks a size of one of its places."""
         self.factors_of(engine, point)
 
+    def is_displayed(self, engine: Engine, fidelity: Fidelity, requested: Collection[Channel] = ()) -> bool:
+        """Return True if results of an engine, with measures of the `requested` channels, show it place by place."""
+        is_known = self.is_block_load or not fidelity.has_uneven_speed
+        has_places = is_known and self.needs.of(engine) and self.places(engine)
+        return bool(has_places and (self in requested or self.display.applies(engine)))
+
+    @property
+    def key(self) -> str:
+        """Key in `result.json`."""
+        return self.display.key or self.name.replace(" ", "_")
+
     @property
     def norms(self) -> Collection[str]:
         """Names of the norms that apply to it."""
@@ -284,10 +316,6 @@ def _names_of_mounts(engine: Engine) -> Sequence[str]:
     return [mount.name for mount in engine.mounts]
 
 
-def _names_of_bearings(engine: Engine) -> Sequence[str]:
-    return [bearing.name for bearing in engine.bearings]
-
-
 def names_of_cylinders(engine: Engine) -> Sequence[str]:
     """Return the names of the cylinders, which are the places of their loads."""
     return [part.name for part in engine.slider_cranks]
@@ -296,13 +324,12 @@ def names_of_cylinders(engine: Engine) -> Sequence[str]:
 PlaceSpec: TypeAlias = tuple[tuple[str, ...], Need, Callable[[Engine], Sequence[str]]]
 """Keys that narrow a load, part that it needs, and function that returns the names of its places."""
 IN_EACH_CYLINDER: PlaceSpec = (IN_CYLINDERS, Needs.UNCONDITIONAL, names_of_cylinders)
-AT_EACH_CRANK_PIN: PlaceSpec = (AT_CYLINDERS, Needs.UNCONDITIONAL, names_of_cylinders)
-AT_EACH_BEARING: PlaceSpec = (AT_BEARINGS, Needs.BEARINGS, _names_of_bearings)
-OF_EACH_BEARING: PlaceSpec = (OF_BEARINGS, Needs.BEARINGS, _names_of_bearings)
 Load: TypeAlias = Callable[[Engine, OperatingPoint, Fidelity], Spectrum]
 
 
-def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor: Factor | None = None) -> LoadChannel:
+def crankcase_channel(
+    name: str, unit: str, where: PlaceSpec, load: Load, factor: Factor | None = None, display: Display = Display()
+) -> LoadChannel:
     """Return the channel (a quantity that measures can use) of a load inside the crankcase (Z1).
 
     Parameters
@@ -313,6 +340,8 @@ def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor
         Function of engine, operating point and fidelity that returns the spectrum, shape (n, places, d).
     factor
         Size factors by which the load is multiplied; None for none.
+    display
+        Its table and curves.
     """
 
     def signal(moving_parts: Engine, loads: PointLoads) -> Spectrum:
@@ -324,7 +353,14 @@ def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor
 
     keys, needs, places = where
     channel = LoadChannel(
-        name, unit, keys, needs, signal=crankcase_signal(name, signal), places=places, size_factors=factor
+        name,
+        unit,
+        keys,
+        needs,
+        signal=crankcase_signal(name, signal),
+        places=places,
+        size_factors=factor,
+        display=display,
     )
     return channel
 
@@ -485,7 +521,9 @@ def _on_block(name: str, unit: str, part: slice, depends_on_gas: bool = False) -
     return LoadChannel(name, unit, keys, signal=signal, part=part, depends_on_gas=depends_on_gas, is_block_load=True)
 
 
-def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
+def _on_mounts(
+    name: str, unit: str, needs: Need, display: Display, signal: Callable[[PointLoads], Spectrum | None]
+) -> LoadChannel:
     def signal_of_mounts(loads: PointLoads) -> Spectrum:
         spectrum = signal(loads)
         if spectrum is None:
@@ -493,7 +531,14 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
         return spectrum
 
     return LoadChannel(
-        name, unit, AT_MOUNTS, needs, signal=signal_of_mounts, places=_names_of_mounts, is_block_load=True
+        name,
+        unit,
+        AT_MOUNTS,
+        needs,
+        signal=signal_of_mounts,
+        places=_names_of_mounts,
+        is_block_load=True,
+        display=display,
     )
 
 
@@ -508,12 +553,17 @@ def _stored_work(moving_parts: Engine, point: OperatingPoint, fidelity: Fidelity
     return excess_torque(moving_parts, point, fidelity).integral.mapped(lambda values: values[:, None, None])
 
 
-MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
+MOUNT_FORCE = _on_mounts(
+    "mount force", "N", Needs.MOUNTS, Display("Mount forces", "mount", "mounts", "force on"),
+    lambda loads: loads.mount_forces,
+)  # fmt: skip
 RESULTANT_MOUNT_FORCE = LoadChannel(
     "resultant mount force", "N", OF_VECTOR, Needs.MOUNTS, is_block_load=True,
     signal=lambda loads: MOUNT_FORCE.signal(loads).mapped(lambda values: values.sum(axis=1, keepdims=True)),
 )  # fmt: skip
-MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
+MOUNT_TRAVEL = _on_mounts(
+    "mount travel", "m", Needs.ELASTIC, Display(place="mount", curve="travel at"), lambda loads: loads.mount_travel
+)
 AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
 """Loads at mounts for which bounds over boxes of mount numbers exist."""
 SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3))
@@ -522,26 +572,10 @@ ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), depends_on_gas=True)
 SURGING_FORCE = _on_block("surging force", "N", slice(1, 2))
 SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6))
 OF_BLOCK = (SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE)
-MAIN_BEARING_FORCE = crankcase_channel("main-bearing force", "N", AT_EACH_BEARING, bearings.main_bearing_forces)
-MAIN_BEARING_PRESSURE = crankcase_channel(
-    "main-bearing pressure", "Pa", AT_EACH_BEARING, bearings.main_bearing_forces, bearings.bearing_factors
+CRANK_TORQUE = crankcase_channel(
+    "crank torque", "N m", _ON_CRANK, _crank_torque, display=Display(place="shaft", curve="torque of")
 )
-HAMMER_BLOW = crankcase_channel("hammer blow", "N", OF_EACH_BEARING, bearings.hammer_blows)
-CRANK_TORQUE = crankcase_channel("crank torque", "N m", _ON_CRANK, _crank_torque)
 STORED_WORK = crankcase_channel("stored work", "J", _ON_CRANK, _stored_work)
-CRANK_PIN_FORCE = crankcase_channel("crank-pin force", "N", AT_EACH_CRANK_PIN, bearings.pin_forces)
-CRANK_PIN_PRESSURE = crankcase_channel(
-    "crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, bearings.pin_forces, bearings.crank_pin_factors
-)
-SIDE_FORCE = crankcase_channel(
-    "side force", "N", IN_EACH_CYLINDER,
-    lambda *at: bearings.piston_pin_forces(*at).mapped(lambda values: values[..., 1:]),
-)  # fmt: skip
-ROD_FORCE = crankcase_channel("rod force", "N", IN_EACH_CYLINDER, bearings.piston_pin_forces)
-FRICTION_POWER = replace(
-    crankcase_channel("friction power", "W", OF_EACH_BEARING, bearings.main_bearing_forces, bearings.drag_factors),
-    sums_places=True, keys=("operating_points", "orders", "bearings"),
-)  # fmt: skip
 
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
@@ -555,7 +589,10 @@ def is_at_mounts(channel: Channel) -> bool:
 
 CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, RESULTANT_MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
-    HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
-    SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
-    ADDED_MASS, *OF_MOUNTING,
+    CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS, *OF_MOUNTING,
 ))  # fmt: skip
+
+
+def load_channels() -> list[LoadChannel]:
+    """Return the channels of loads."""
+    return [channel for channel in CHANNELS.values() if isinstance(channel, LoadChannel)]

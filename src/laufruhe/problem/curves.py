@@ -16,17 +16,8 @@ import numpy as np
 from laufruhe.errors import ModelError, check_integer
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, common_base, order_amplitude
-from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.problem.channels import (
-    CRANK_PIN_FORCE,
-    CRANK_TORQUE,
-    MAIN_BEARING_FORCE,
-    MOUNT_FORCE,
-    MOUNT_TRAVEL,
-    LoadChannel,
-    mounting_in,
-)
+from laufruhe.problem.channels import load_channels, mounting_in
 from laufruhe.problem.evaluation import Evaluation, with_common_base
 from laufruhe.problem.loads import PointLoads
 
@@ -276,16 +267,7 @@ def _signals(design: Evaluation) -> Iterator[_Signal]:
     # parts of the wrench, then each load with several places
     for words, unit, part in _WRENCH:
         yield words.replace(" ", "_"), words, unit, (), lambda loads: loads.wrench, part
-    places: list[tuple[str, str, str, LoadChannel]] = []
-    if design.engine.mounts:
-        places.append(("mount_force", "force on", "mount", MOUNT_FORCE))
-    if design.engine.mounts and design.engine.block is not None:
-        places.append(("mount_travel", "travel at", "mount", MOUNT_TRAVEL))
-    if has_bearing_loads(design.engine, design.fidelity):
-        places.append(("crank_torque", "torque of", "shaft", CRANK_TORQUE))
-        if design.engine.bearings:
-            places.append(("main_bearing_force", "force on", "bearing", MAIN_BEARING_FORCE))
-            places.append(("crank_pin_force", "force on pin of", "cylinder", CRANK_PIN_FORCE))
-    for name, words, place, channel in places:
-        axis = CurveAxis(place, tuple(channel.places(design.engine)))
-        yield name, words, channel.unit, (axis,), channel.signal, slice(None)
+    for load in load_channels():
+        if load.display.curve and load.is_displayed(design.engine, design.fidelity):
+            axis, name = CurveAxis(load.display.place, tuple(load.places(design.engine))), load.name.replace("-", " ")
+            yield name.replace(" ", "_"), load.display.curve, load.unit, (axis,), load.signal, slice(None)

@@ -25,8 +25,8 @@ class Dependence(StrEnum):
     AFFINE = "affine"
     """Affine; a mass is a sum of lengths of affine vectors."""
     BIAFFINE = "affine while unbalances are fixed"
-    KINKED = "affine between bearings while unbalances are fixed"
-    """Affine in the place of a rotor while unbalances are fixed, with a kink where it passes a bearing (B4)."""
+    KINKED = "affine between supports of the shaft while unbalances are fixed"
+    """Affine in the place of a rotor while unbalances are fixed, with a kink where it passes a support (B4)."""
     MASSES = "affine in masses that follow, times a factor that goes one way"
     """Affine in masses that follow from sizes, times a factor of each place that is monotone in each size (Z2)."""
     SHIFT = "a sum of parts, each earlier by its own angle"
@@ -57,14 +57,6 @@ swaying couple                      a a a  b m >  >  0 0  0
 mount force                         a a a  b m >  >  s s  0
 resultant mount force               a a a  b m >  >  s s  0
 mount travel                        a a a  b m >  >  s s  0
-main-bearing force                  a a a  v m >  >  0 0  0
-main-bearing pressure               a a a  v m >  >  0 0  0
-hammer blow                         a a a  v m >  >  0 0  0
-friction power                      a a a  v m >  >  0 0  0
-crank-pin force                     0 0 a  0 m s  >  0 0  0
-crank-pin pressure                  0 0 a  0 m s  >  0 0  0
-side force                          0 0 a  0 m s  >  0 0  0
-rod force                           0 0 a  0 m s  >  0 0  0
 crank torque                        0 0 a  0 m >  >  0 0  0
 stored work                         0 0 a  0 m >  >  0 0  0
 counterweight mass                  a 0 a  0 0 0  a  0 0  0
@@ -123,8 +115,8 @@ def _with_extensions(core_rows: Mapping[str, dict[Kind, Dependence]]) -> dict[st
 
 TABLE: Mapping[str, Mapping[Kind, Dependence]] = _with_extensions(dict(map(_row, _TABLE.strip().splitlines()[1:])))
 """Dependences by the name of the channel and the kind of decision."""
-# loads of bearings depend on the positions of rotors on the shafts that they carry
-_OF_BEARINGS = frozenset(
+# loads of supports depend on the positions of rotors on the shafts that they carry
+_OF_SUPPORTS = frozenset(
     name for name, row in TABLE.items()
     if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.KINKED)
 )  # fmt: skip
@@ -145,10 +137,10 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
         return _OF_GRAVITY[channel.name]
     if entry in (Dependence.NONE, Dependence.UNKNOWN):
         return entry
-    if kind is Kind.PLACE and channel.name in _OF_BEARINGS and not _moves_carried(problem):
+    if kind is Kind.PLACE and channel.name in _OF_SUPPORTS and not _moves_carried(problem):
         return Dependence.NONE
     if entry is Dependence.KINKED and problem.fidelity.crankshaft != "cut":
-        # a continuous beam passes loads on to all bearings
+        # a continuous beam passes loads on to all supports
         return Dependence.SMOOTH
     if kind is Kind.STIFFNESS and problem.engine.block is None and channel.is_load:
         # rigid mounts share a force by their positions alone
@@ -209,7 +201,6 @@ def shares_gas(problem: Problem) -> bool:
 
 
 def _moves_carried(problem: Problem) -> bool:
-    # True if a bearing carries a shaft with rotors of open position
-    carried = {bearing.shaft.name for bearing in problem.engine.bearings}
+    # True if a support carries a shaft with rotors of open position
     moving = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
-    return any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moving)
+    return any(rotor.shaft.name in problem.engine.supports for rotor in problem.engine.rotors if rotor.name in moving)

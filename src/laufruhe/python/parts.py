@@ -125,14 +125,6 @@ class EngineParts(Parts):
         """
         return self._with("load_cases", "load_case", keys_of(locals()))
 
-    def main_bearing(
-        self, name: str | None = None, *, x: Value | None = None, beside_throws: Value | None = None,
-        shaft: str | None = None, diameter: Value | None = None, width: Value | None = None,
-        friction: Value | None = None,
-    ) -> Self:
-        """Return the engine with a main bearing. Bearings of the crankshaft in the block."""
-        return self._with("main_bearings", "main_bearing", keys_of(locals()))
-
     def load_torque(
         self, *, file: str, sheet: str | None = None, angle_column: str | int | None = None,
         angle_unit: str | None = None, cycles: Literal["mean", "worst"] | int | None = None, smooth: bool | None = None,
@@ -209,6 +201,14 @@ class EngineParts(Parts):
     ) -> Self:
         """Return the engine with correction. Holes and slugs that correct the unbalance of a rotor in two planes."""
         return self._with("correction", "correction", keys_of(locals()))
+
+    def main_bearing(
+        self, name: str | None = None, *, x: Value | None = None, beside_throws: Value | None = None,
+        shaft: str | None = None, diameter: Value | None = None, width: Value | None = None,
+        friction: Value | None = None,
+    ) -> Self:
+        """Return the engine with a main bearing. Bearings of the crankshaft in the block."""
+        return self._with("main_bearings", "main_bearing", keys_of(locals()))
 
     def electric_machine(
         self, name: str, *, shaft: str | None = None, stator: Literal["block", "ground"] | None = None,

@@ -27,8 +27,7 @@ KINDS = ("png", "svg")
 """Endings of picture files."""
 TABLES = (
     "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings", "torque",
-    "uneven-firing", "willans", "bearings-on-crank", "wear", "mount-critical-speeds",
-    "mounts", "mounting",
+    "uneven-firing", "willans", "mount-critical-speeds", "mounts", "mounting",
     "reach", "objectives-in-order", "equal-optima", "weights", "shafts", "balance-factors", "crankshaft-torque",
     "gas-pressure", "load-cases", "even-speeds",
 )  # fmt: skip

@@ -45,7 +45,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
     problem, engine, proof = result.problem, result.final.engine, result.certificate
     points = [_point(result, k) for k in range(len(problem.points))]
     # a single operating point is at the top level
-    places = {"mounts": None} | {places.key: None for places in places_of(result)}
+    places = {"mounts": None} | {load.key: None for load in places_of(result)}
     keys = ("name", "speed", "weight", "torque", "gas", *((*places, "shaking") if len(points) > 1 else ()))
     if series:
         keys += ("series",)
@@ -137,7 +137,7 @@ def _point(result: Result, k: int) -> Record:
     return {
         **_attributes(point, "name speed weight"),
         "mounts": [],
-        **{places.key: _places(result, k, places.channel) for places in places_of(result)},
+        **{load.key: _places(result, k, load) for load in places_of(result)},
         "shaking": _shaking(final.loads[k].wrench),
         "torque": _attributes(facts, "mean power least=minimum largest excursion irregularity")
         | {"turning": turning and asdict(turning)},
@@ -170,7 +170,7 @@ def _series(result: Result, k: int) -> Record:
         "angle": _plain(angles),
         "components": list(WRENCH),
         "shaking": _plain(wrench),
-        **{places.key: _plain(channel_samples(final, k, places.channel)) for places in places_of(result)},
+        **{load.key: _plain(channel_samples(final, k, load)) for load in places_of(result)},
     }
 
 

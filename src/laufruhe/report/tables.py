@@ -13,7 +13,6 @@ import numpy as np
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.bearing_loads import wear_of
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.torque import excess_torque, swing_of, torque_parts, turning_inertia
 from laufruhe.physics.willans import FrictionTest
@@ -22,11 +21,7 @@ from laufruhe.present.curves import (
     transmissibility_speeds,
 )
 from laufruhe.present.measures import (
-    BEARINGS,
-    as_crank_turns,
-    bearing_paths,
     designs_with_loads,
-    has_bearings,
     has_loads,
     has_ranking,
     limits_of,
@@ -79,12 +74,12 @@ def _values(entries: Sequence[DecisionValue | LimitValue]) -> Table:
 
 def _measures(result: Result) -> Table:
     rows = [
-        [places.title, point.name, design, name, cycle.mean, cycle.max, cycle.rms, places.channel.unit]
-        for places in places_of(result)
+        [load.display.title, point.name, design, name, cycle.mean, cycle.max, cycle.rms, load.unit]
+        for load in places_of(result)
         for k, point in enumerate(result.problem.points)
         for design, evaluation in designs_with_loads(result).items()
         for name, cycle in zip(
-            places.channel.places(evaluation.engine), place_measures(evaluation, k, places.channel), strict=True
+            load.places(evaluation.engine), place_measures(evaluation, k, load), strict=True
         )
     ]  # fmt: skip
     return Table(["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"], rows)
@@ -123,7 +118,6 @@ def _degrees(angles: Iterable[float]) -> str:
     return " ".join(f"{math.degrees(angle):.6g}" for angle in angles)
 
 
-DIRECTIONS = 180
 """Number of directions of the wear table."""
 
 
@@ -193,37 +187,6 @@ def _test_rows(test: FrictionTest) -> Iterator[list[Any]]:
     yield [test.at, "friction", *friction_row, line if test.is_motored else 0.0, friction.deviation]
 
 
-def _on_crank(result: Result) -> Table:
-    """Return a table of forces on main bearings over the cycle, along and across the turning crank (B4)."""
-    names, rows, heads = BEARINGS.channel.places(result.final.engine), [], []
-    designs = designs_with_loads(result)
-    for k, point in enumerate(result.problem.points):
-        columns = []
-        for design in designs.values():
-            paths = bearing_paths(design, k)
-            turned = paths * as_crank_turns(design, len(paths))[:, None]
-            columns += [part for path in turned.T for part in (path.real, path.imag)]
-        angles = np.degrees(result.final.engine.cycle.angle) * np.arange(len(paths)) / len(paths)
-        rows += [[point.name, *row] for row in np.column_stack([angles, *columns]).tolist()]
-    for name in designs:
-        lead = f"{name}: force on " if len(designs) > 1 else "force on "
-        heads += [
-            f"{lead}{bearing} {direction} the crank [N]" for bearing in names for direction in ("along", "across")
-        ]
-    return Table(["point", "angle [deg]", *heads], rows)
-
-
-def _wear(result: Result) -> Table:
-    names, angles = BEARINGS.channel.places(result.final.engine), math.tau * np.arange(DIRECTIONS) / DIRECTIONS
-    rows = []
-    for name, design in designs_with_loads(result).items():
-        for k, point in enumerate(result.problem.points):
-            wear = [wear_of(path, angles) for path in bearing_paths(design, k).T]
-            rows += [[name, point.name, *row] for row in np.column_stack([np.degrees(angles), *wear]).tolist()]
-    head = ["design", "point", "direction from z towards y [deg]", *(f"wear of {name} [-]" for name in names)]
-    return Table(head, rows)
-
-
 def _mount_criticals(result: Result) -> Table:
     rows = []
     for name, design in designs_with_loads(result).items():
@@ -284,8 +247,6 @@ _TABLES: NumberTables = {
     "torque": (lambda result: uses_torque(result) and has_loads(result), _torque),
     "uneven-firing": (has_ranking, _uneven_firing),
     "willans": (lambda result: result.problem.friction, _willans),
-    "bearings-on-crank": (has_bearings, _on_crank),
-    "wear": (has_bearings, _wear),
     "mount-critical-speeds": (is_elastic, _mount_criticals),
     "mounts": (is_elastic, _mounts),
     "mounting": (is_elastic, _mounting),

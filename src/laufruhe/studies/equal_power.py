@@ -83,7 +83,6 @@ def _scaled(drawing: Drawing, scale: EqualPowerScale) -> Drawing:
         engine,
         slider_cranks=tuple(scale_part(part, k, m) for part in engine.slider_cranks),
         rotors=tuple(scale_part(rotor, k, m) for rotor in engine.rotors),
-        bearings=tuple(scale_part(bearing, k, m) for bearing in engine.bearings),
         extras=tuple(extra.scaled(k, m) for extra in engine.extras),
         load_torque=load and replace(load, torques=tuple(torque / scale.speed for torque in load.torques)),
         mounts=tuple(scale_part(mount, k, m) for mount in engine.mounts),

@@ -15,10 +15,10 @@ from scipy.integrate import quad
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.bearing_loads.physics import piston_pin_forces
 from laufruhe.extensions.chambers.gas import Chamber, Chambers, Compressor, Steam
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
-from laufruhe.physics.bearing_loads import piston_pin_forces
 from laufruhe.physics.gas_facts import cylinder_facts
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.shaking_loads import shaking_loads

@@ -13,11 +13,11 @@ import pytest
 import laufruhe
 import ready
 from laufruhe.errors import InputError
+from laufruhe.extensions.bearing_loads.channels import SIDE_FORCE
 from laufruhe.extensions.piston_motion.channels import reversals_at
 from laufruhe.extensions.piston_motion.motion import piston_motion
 from laufruhe.extensions.piston_motion.section import SECTION
 from laufruhe.machine import SliderCrank
-from laufruhe.problem.channels import SIDE_FORCE
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.json_result import as_json
 from laufruhe.report.tables import number_tables

@@ -12,13 +12,14 @@ import pytest
 from numpy.typing import NDArray
 
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.bearing_loads.machine import bearings_of
+from laufruhe.extensions.bearing_loads.physics import main_bearing_forces, pin_forces
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.files.reader import load_tables
 from laufruhe.machine import Engine, OperatingPoint, Seiliger, Wiebe
 from laufruhe.machine.gas.charge import chamber_volume
 from laufruhe.numerics.exact_angles import cis
-from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque, swing_of
@@ -143,7 +144,7 @@ class TestGas:
             turning = part.rotating_mass * part.crank_radius * SPEED**2 * np.exp(1j * (phi + part.throw))
             housing[:, k] = np.stack([0.0 * phi, turning.imag, turning.real], axis=1) - pins
         force = bearings.sum(axis=1) + housing.sum(axis=1)
-        arms = np.array([bearing.x for bearing in engine.bearings])
+        arms = np.array([bearing.x for bearing in bearings_of(engine)])
         couple = -(bearings[:, :, 2] @ arms) - housing[:, :, 2] @ np.array([p.x for p in engine.slider_cranks])
         wrench = shaking_loads(engine, point).values(phi)
         size = float(np.abs(wrench[:, 4]).max())

@@ -16,6 +16,7 @@ import laufruhe
 import ready
 from claims.test_broken_bounders import scaled, times
 from laufruhe.errors import BoundError, InputError, ModelError
+from laufruhe.extensions.bearing_loads.machine import bearings_of
 from laufruhe.extensions.sizes.boxes import SizeBoxes
 from laufruhe.extensions.sizes.machine import RunningGear
 from laufruhe.extensions.sizes.model import SizeModel
@@ -251,7 +252,7 @@ def test_sizes_without_added_mass_agree_with_a_geometric_program() -> None:
     engine, point = result.final.engine, result.problem.points[0]
     forces = {limit.name: limit.value for limit in result.limits}
     # loads back from the stresses at the design: what is compared is the optimum over the sizes
-    pin, journal, web = engine.slider_cranks[0].big_end, engine.bearings[1], engine.extra(RunningGear).webs
+    pin, journal, web = engine.slider_cranks[0].big_end, bearings_of(engine)[1], engine.extra(RunningGear).webs
     load = forces["maximum crank-pin bending stress"] * math.pi / 32.0 * pin[0] ** 3 / 0.05
     torque = forces["maximum journal torsion stress"] * math.pi / 16.0 * journal.diameter**3
     assert torque == pytest.approx(np.abs(crank_torque(engine, point).sample(100_000)).max(), rel=1e-4)

@@ -11,10 +11,11 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings, bearings_of
+from laufruhe.extensions.bearing_loads.physics import pin_forces, piston_pin_forces
 from laufruhe.extensions.sizes import strength
 from laufruhe.extensions.sizes.machine import Bolts, PistonPin, RunningGear, Shank, Webs, moving_gear, resized
-from laufruhe.machine import Bearing, Engine, OperatingPoint
-from laufruhe.physics.bearing_loads import pin_forces, piston_pin_forces
+from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import evaluate
@@ -109,7 +110,8 @@ class TestTextbook:
         length, width, b, h, d, force = 0.16, 0.04, 0.09, 0.03, 0.055, 1e4
         part = replace(engine.slider_cranks[0], x=0.0, big_end=(d, length - 2.0 * h - width))
         bearings = tuple(Bearing(str(x), x, 0.06, width) for x in (0.5 * length, -0.5 * length))
-        one = replace(sized(engine, webs=Webs(b, h)), slider_cranks=(part,), bearings=bearings, rotors=())
+        one = replace(sized(engine, webs=Webs(b, h)), slider_cranks=(part,), rotors=())
+        one = one.with_extra(MainBearings(bearings))
         moment = strength.pin_moments(one, POINT, EXACT).sample(1)[0, 0, 2]
         side = strength.side_forces(one, POINT, EXACT).sample(1)[0, :, 2]
         load = pin_forces(one, POINT).sample(1)[0, 0, 2]
@@ -121,7 +123,7 @@ class TestTextbook:
     def test_journal_of_a_mean_torque_is_eq_98(self, engine: Engine) -> None:
         torque = 1234.0
         diameter = (16.0 * torque / (30e6 * math.pi)) ** (1.0 / 3.0)
-        one = replace(engine, bearings=(Bearing("", 0.0, diameter, 0.03),))
+        one = engine.with_extra(MainBearings((Bearing("", 0.0, diameter, 0.03),)))
         assert torque * strength.journal_factors(one, POINT)[0] == pytest.approx(30e6)
 
 
@@ -185,7 +187,7 @@ def test_stresses_are_measures_of_a_problem() -> None:
     speed = evaluation.value(Measure(*MEASURES["maximum main-bearing pressure times speed"]))
     pressures = [
         evaluation.value(Measure(*MEASURES["maximum main-bearing pressure"], at=(b.name,))) * 0.5 * b.diameter
-        for b in problem.engine.bearings if b.diameter is not None
+        for b in bearings_of(problem.engine) if b.diameter is not None
     ]  # fmt: skip
     assert speed == pytest.approx(max(pressures) * point.speed, rel=1e-9)
     bolts = evaluation.value(Measure(*MEASURES["maximum bolt stress"]))
@@ -273,10 +275,10 @@ def test_sizes_that_are_none_are_one_line_each(old: str, new: str, rule: str, tm
 @pytest.mark.parametrize(
     ("change", "rule"),
     [
-        (lambda e: replace(e, extras=()), "add \\[running_gear\\]"),
+        (lambda e: replace(e, extras=(MainBearings(bearings_of(e)),)), "add \\[running_gear\\]"),
         (lambda e: e.with_extra(replace(e.extra(RunningGear), webs=None)), "has no webs"),
-        (lambda e: replace(e, bearings=e.bearings[1:]), "no main bearing on one side"),
-        (lambda e: replace(e, bearings=e.bearings[::2]), "no main bearing between them"),
+        (lambda e: e.with_extra(MainBearings(bearings_of(e)[1:])), "no main bearing on one side"),
+        (lambda e: e.with_extra(MainBearings(bearings_of(e)[::2])), "no main bearing between them"),
     ],
 )  # fmt: skip
 def test_a_missing_dimension_is_named(change: object, rule: str, engine: Engine) -> None:

@@ -70,10 +70,10 @@ def picture_of(designs: Sequence[Design], title: str) -> p.Picture:
     """Return bars of the loads at places that all designs have, and of their largest orders."""
     panels = [
         _panel(
-            f"{places.title}, mean", places.channel.unit, shared_names(columns),
+            f"{load.display.title}, mean", load.unit, shared_names(columns),
             [[of_place(column, name, "mean") for name in shared_names(columns)] for column in columns],
         )
-        for places, columns in common_places(designs)
+        for load, columns in common_places(designs)
         if shared_names(columns)
     ]  # fmt: skip
     panels += [

@@ -15,9 +15,9 @@ from laufruhe.files.nested import Place, at, number_at
 from laufruhe.files.problem_file import file_model
 from laufruhe.files.study_tables import path_text
 from laufruhe.files.toml_text import toml_value
-from laufruhe.present.measures import BEARINGS, FRICTION, MOUNTS, PINS, Places, titled_places
 from laufruhe.present.numbers import DASH, number, percent
 from laufruhe.present.tables import Table
+from laufruhe.problem.channels import LoadChannel, load_channels
 from laufruhe.units import readable
 
 Value: TypeAlias = float | str | None
@@ -210,12 +210,12 @@ def _decisions(designs: Sequence[Design]) -> Iterator[Row]:
         yield Row(DECISIONS, name, unit, [entry["value"] if entry else None for entry in entries])
 
 
-def common_places(designs: Sequence[Design]) -> Iterator[tuple[Places, list[list[Mapping[str, Any]]]]]:
+def common_places(designs: Sequence[Design]) -> Iterator[tuple[LoadChannel, list[list[Mapping[str, Any]]]]]:
     """Yield each load at mounts, bearings or other places that all designs have, with its entries by design."""
-    for places in (MOUNTS, BEARINGS, PINS, FRICTION, *titled_places()):
-        entries = [design.record.get(places.key) or [] for design in designs if design.has_design]
+    for load in (load for load in load_channels() if load.display.title):
+        entries = [design.record.get(load.key) or [] for design in designs if design.has_design]
         if all(entries) and len(entries) > 1:
-            yield places, [(design.record[places.key] if design.has_design else []) for design in designs]
+            yield load, [(design.record[load.key] if design.has_design else []) for design in designs]
 
 
 def shared_names(columns: Collection[Sequence[Mapping[str, Any]]]) -> list[str]:
@@ -230,13 +230,13 @@ def of_place(column: Sequence[Mapping[str, Any]], name: str, key: str) -> float 
 
 
 def _at_places(designs: Sequence[Design]) -> Iterator[Row]:
-    for places, columns in common_places(designs):
+    for load, columns in common_places(designs):
         for name in shared_names(columns):
             for key, words in (("mean", "mean"), ("max", "maximum")):
                 values = [of_place(column, name, key) for column in columns]
-                yield Row(places.title, f"{name}, {words}", places.channel.unit, values)
+                yield Row(load.display.title, f"{name}, {words}", load.unit, values)
         largest = [max((e["max"] for e in column if e["max"] is not None), default=None) for column in columns]
-        yield Row(places.title, "largest of all", places.channel.unit, largest)
+        yield Row(load.display.title, "largest of all", load.unit, largest)
 
 
 def _orders(designs: Sequence[Design]) -> Iterator[Row]:
@@ -250,9 +250,9 @@ def order_columns(designs: Sequence[Design]) -> Iterator[tuple[str, str, dict[fl
 
     Mount forces are a mean over the mounts.
     """
-    mounts = next((columns for places, columns in common_places(designs) if places is MOUNTS), None)
-    if mounts is not None:
-        yield "mean mount force", MOUNTS.channel.unit, _largest(designs, [_mean_orders(column) for column in mounts])
+    for load, columns in common_places(designs):
+        if load.key == "mounts":
+            yield "mean mount force", load.unit, _largest(designs, [_mean_orders(column) for column in columns])
     for key, name, unit in SHAKING:
         shaking = [design.record["shaking"] for design in designs]
         by_order = _largest(designs, [dict(zip(part["orders"], part[key], strict=True)) for part in shaking])

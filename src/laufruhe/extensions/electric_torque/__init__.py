@@ -6,8 +6,7 @@ _HERE = "laufruhe.extensions.electric_torque"
 _AFFINE = ("roll moment", "mount force", "resultant mount force", "mount travel", "stored work")
 _SMOOTH = ("transmissibility", "degree of irregularity")
 _FREE = (
-    "shaking force", "rocking couple", "surging force", "swaying couple", "main-bearing force", "main-bearing pressure",
-    "hammer blow", "friction power", "crank-pin force", "crank-pin pressure", "side force", "rod force", "crank torque",
+    "shaking force", "rocking couple", "surging force", "swaying couple", "crank torque",
     "counterweight mass", "balancer mass", "added mass", "static sag", "natural frequencies", "motion frequencies",
     "kinetic-energy decoupling", "decoupling shortfall", "torque-roll residual", "raw torque-roll residual",
     "total stiffness", "static travel", "static mount force", "flywheel inertia", "flywheel mass", "rim stress",

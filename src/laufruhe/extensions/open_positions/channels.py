@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from laufruhe.machine import CRANKSHAFT, Engine, Role, Shaft
-from laufruhe.problem.channels import Need, NumberChannel
+from laufruhe.problem.channels import Display, Need, NumberChannel
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 Span = tuple[float, float]
@@ -108,7 +108,7 @@ def _channel(name: str, sides: tuple[str, ...], span: SpanFunction) -> ShaftChan
 
     return ShaftChannel(
         name, "m", ("of",), _SHAFTS, sides, minimised=False, depends_on_loads=False, values=values, span=span,
-        places=shafts_of, place="shaft",
+        places=shafts_of, display=Display(place="shaft"),
     )  # fmt: skip
 
 

@@ -60,13 +60,13 @@ class Relaxation:
         for k, place in enumerate(self.places):
             for drive in place.place_drives:
                 self._placed.setdefault(drive.rotor, []).append(k)
-        # positions of inner bearings [m]
+        # positions of inner supports [m]
         self._kinks = [np.zeros(0) for _ in self.places]
         if any(dependence(m.channel, Kind.PLACE, problem) is Dependence.KINKED for m in problem.measures):
             for k, place in enumerate(self.places):
-                shafts = {self._rotors[drive.rotor].shaft for drive in place.place_drives if drive.axis == AXIAL}
-                bearings = (sorted(b.x for b in problem.engine.bearings if b.shaft == shaft) for shaft in shafts)
-                self._kinks[k] = np.unique([x for positions in bearings for x in positions[1:-1]])
+                shafts = {self._rotors[drive.rotor].shaft.name for drive in place.place_drives if drive.axis == AXIAL}
+                supports = (problem.engine.supports.get(shaft, ()) for shaft in shafts)
+                self._kinks[k] = np.unique([x for positions in supports for x in positions[1:-1]])
 
     def _nodes(self, lower: Array, upper: Array) -> list[Array]:
         sides = zip(self._kinks, lower, upper, strict=True)

@@ -17,7 +17,7 @@ from laufruhe.errors import ModelError, printed, wrong_call
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.channels import CHANNELS, LoadChannel
+from laufruhe.problem.channels import CHANNELS, Display, LoadChannel
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Term
@@ -144,8 +144,8 @@ def _linear_channel(name: str, function: Callable[[Array], Array], of: LoadChann
         return spectrum.mapped(lambda values: np.tensordot(values, matrix, axes=2))
 
     return replace(
-        of, name=name, unit=unit or of.unit, signal=signal, linear_in=of, part=None, places=lambda _: (), title="",
-        place="",
+        of, name=name, unit=unit or of.unit, signal=signal, linear_in=of, part=None, places=lambda _: (),
+        display=Display(),
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ _HERE = "laufruhe.extensions.piston_motion"
 _OF_SHAPE = ("piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle", "rod length")
 EXTENSION = Extension(
     "piston_motion",
+    needs=("bearing_loads",),
     channels=tuple(
         f"{_HERE}.channels:{name}"
         for name in ("TRAVEL", "MEAN_SPEED", "SPEED", "ACCELERATION", "ROD_ANGLE", "ROD_LENGTH", "REVERSAL_RATE")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from laufruhe.extensions.bearing_loads.channels import SIDE_FORCE
 from laufruhe.extensions.piston_motion.motion import Extreme, PistonMotion, piston_motion, pistons_of, reversals
 from laufruhe.machine import Engine
-from laufruhe.problem.channels import SIDE_FORCE, Need, NumberChannel, names_of_cylinders
+from laufruhe.problem.channels import Need, NumberChannel, names_of_cylinders
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 PISTONS = Need(pistons_of, "pistons", "choose another quantity; apexes of rotors have an apex speed")

@@ -10,7 +10,6 @@ from typing import Any
 from laufruhe.extensions.piston_motion.channels import RODS, reversals_at
 from laufruhe.extensions.piston_motion.motion import Extreme, PistonMotion, piston_motion, pistons_of
 from laufruhe.machine import SliderCrank
-from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.present.measures import decided_design
 from laufruhe.present.numbers import number, trimmed
 from laufruhe.present.tables import Table
@@ -25,8 +24,8 @@ def _has_pistons(result: Result) -> bool:
 
 
 def _has_side_forces(result: Result) -> bool:
-    engine = result.final.engine
-    return _has_pistons(result) and bool(RODS.of(engine)) and has_bearing_loads(engine, result.final.fidelity)
+    is_even = not result.final.fidelity.has_uneven_speed
+    return is_even and _has_pistons(result) and bool(RODS.of(result.final.engine))
 
 
 def _motions(result: Result) -> Iterator[tuple[PointLoads, SliderCrank, PistonMotion, Sequence[Extreme] | None]]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from laufruhe.extensions.receivers.machine import Quantity, receivers_of
 from laufruhe.extensions.receivers.physics import response
 from laufruhe.machine import Engine
-from laufruhe.problem.channels import LoadChannel, Need, crankcase_signal
+from laufruhe.problem.channels import Display, LoadChannel, Need, crankcase_signal
 
 
 def _channel(quantity: Quantity, unit: str, title: str, *keys: str) -> LoadChannel:
@@ -18,7 +18,7 @@ def _channel(quantity: Quantity, unit: str, title: str, *keys: str) -> LoadChann
     needs = Need(places, f"a receiver with unit {unit}", "add one to [[receivers]]")
     signal = crankcase_signal(name, lambda engine, loads: response(engine, loads, quantity))
     narrowing = ("operating_points", "orders", *keys, "receivers")
-    return LoadChannel(name, unit, narrowing, needs, signal=signal, places=places, title=title, place="receiver")
+    return LoadChannel(name, unit, narrowing, needs, signal=signal, places=places, display=Display(title, "receiver"))
 
 
 ACCELERATION = _channel("acceleration", "m/s^2", "Acceleration at receivers", "direction_weights")

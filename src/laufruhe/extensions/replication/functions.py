@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.extension import object_at
 from laufruhe.machine.layouts import stations
-from laufruhe.physics.bearing_loads import lever_shares
 from laufruhe.physics.elastic_mounts import single_transmissibility
 from laufruhe.physics.modes import GRAVITY, sag_for_critical_speed, sag_frequency
 from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE
@@ -82,7 +82,8 @@ def lever_share(bearings: Sequence[float], place: float, number: int) -> float:
     """Return the share of a load that a bearing carries, the shaft cut in its bearings (B4)."""
     if len(set(bearings)) < len(bearings):
         raise ValueError("two bearings of the shaft have the same position")
-    return float(lever_shares(bearings, [place])[number - 1, 0])
+    shares = object_at("laufruhe.extensions.bearing_loads.physics:lever_shares")(bearings, [place])
+    return float(shares[number - 1, 0])
 
 
 def transmissibility(ratio: Any, loss_factor: Any) -> Any:

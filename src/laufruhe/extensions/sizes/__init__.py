@@ -10,6 +10,7 @@ _CHANNELS = (
 )  # fmt: skip
 EXTENSION = Extension(
     "sizes",
+    needs=("bearing_loads",),
     channels=tuple(f"{_HERE}.channels:{name}" for name in _CHANNELS),
     dependences=(
         "crank-pin bending stress  a 0 a  0 m s  >  0 0  0  torsion=0 electric_machines=0",

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from laufruhe.extensions.bearing_loads.channels import AT_EACH_BEARING, BEARINGS
+from laufruhe.extensions.bearing_loads.physics import main_bearing_forces, piston_pin_forces
 from laufruhe.extensions.sizes import strength
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.bearing_loads import main_bearing_forces, piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.channels import (
     AT_CYLINDERS,
-    AT_EACH_BEARING,
     AT_WEBS,
     IN_EACH_CYLINDER,
     Need,
@@ -28,8 +28,8 @@ def _names_of_sides(engine: Engine) -> Sequence[str]:
     return [f"{part.name} {side}" for part in engine.slider_cranks for side in ("front", "rear")]
 
 
-_AT_EACH_PIN: PlaceSpec = (AT_CYLINDERS, Needs.BEARINGS, names_of_cylinders)
-_AT_EACH_WEB: PlaceSpec = (AT_WEBS, Needs.BEARINGS, _names_of_sides)
+_AT_EACH_PIN: PlaceSpec = (AT_CYLINDERS, BEARINGS, names_of_cylinders)
+_AT_EACH_WEB: PlaceSpec = (AT_WEBS, BEARINGS, _names_of_sides)
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -74,5 +74,5 @@ PIN_DEFLECTION = crankcase_channel(
 PIN_OVALITY = crankcase_channel(
     "piston-pin ovality", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.ovality_factors
 )
-THROW_CLEARANCE = _size_channel("throw clearance", "m", Needs.BEARINGS, ("min",), strength.throw_clearance)
+THROW_CLEARANCE = _size_channel("throw clearance", "m", BEARINGS, ("min",), strength.throw_clearance)
 GEAR_MASS = _size_channel("running-gear mass", "kg", Needs.UNCONDITIONAL, ("max",), strength.running_gear_mass)

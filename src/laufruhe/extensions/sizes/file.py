@@ -10,6 +10,8 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from laufruhe import units
+from laufruhe.extensions.bearing_loads.file import MainBearingTable, bearings_in
+from laufruhe.extensions.bearing_loads.machine import Bearing
 from laufruhe.extensions.sizes.machine import (
     BIG_END,
     ROD_LENGTH,
@@ -24,13 +26,12 @@ from laufruhe.extensions.sizes.machine import (
     on,
 )
 from laufruhe.files import fields as f
-from laufruhe.files.bearings import MainBearingTable, expand_bearings
 from laufruhe.files.complaints import Refused, errors_at_key
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Open, Table
-from laufruhe.files.problem_file import ExtensionContext, Key
+from laufruhe.files.problem_file import ExtensionContext, Key, ProblemFile
 from laufruhe.files.rotors import check_factors
-from laufruhe.machine import CRANKSHAFT, Bearing, SliderCrank
+from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.numerics.exact_angles import as_turn, cis
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
@@ -86,9 +87,10 @@ class RunningGearTable(Table):
 
 
 def _with_gear_masses(
-    table: RunningGearTable, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...], bearings: tuple[Bearing, ...]
+    table: RunningGearTable, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...], file: ProblemFile
 ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
     # Z2: slider-cranks and throws with the masses of the initial sizes
+    bearings = tuple(bearing for _, bearing in bearings_in(file, throws, parts))
     other_throws = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
     throws = tuple(throw for throw in throws if throw.shaft == CRANKSHAFT)
     gear = _gear_of(table, parts, throws)
@@ -150,8 +152,8 @@ def _sizes_in_file(
 
 def _read(table: RunningGearTable | None, problem: Problem, context: ExtensionContext) -> Problem:
     engine, throws = problem.engine, [throw for throw in context.throws if throw.shaft == CRANKSHAFT]
-    bearings = zip(expand_bearings(context.file.main_bearings, context.throws), engine.bearings, strict=True)
-    decisions = _decisions(table, context.engine, list(bearings))
+    bearings = bearings_in(context.file, context.throws, engine.slider_cranks)
+    decisions = _decisions(table, context.engine, bearings)
     if decisions and table is not None and table.density is not None:
         check_factors(context.file.counterweights, "counts masses that follow from sizes, which are open")
     gear = RunningGear() if table is None else _gear_of(table, engine.slider_cranks, throws)

@@ -13,9 +13,10 @@ from functools import cached_property
 from typing import Any, ClassVar, TypeAlias
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings, bearings_of
 from laufruhe.machine import Engine
 from laufruhe.machine.extra import Extra
-from laufruhe.machine.rotor import Bearing, Rotor
+from laufruhe.machine.rotor import Rotor
 from laufruhe.machine.slider_crank import SliderCrank
 
 Size: TypeAlias = tuple[str, str]
@@ -262,16 +263,16 @@ class MovingGear:
 
 def moving_gear(engine: Engine) -> MovingGear:
     """Return the parts of an engine that sizes change."""
-    return MovingGear(engine.extra(RunningGear), engine.slider_cranks, engine.rotors, engine.bearings)
+    return MovingGear(engine.extra(RunningGear), engine.slider_cranks, engine.rotors, bearings_of(engine))
 
 
 def resized(engine: Engine, sizes: Mapping[Size, float]) -> Engine:
     """Return the engine with other sizes of its running gear [m], and with the masses that follow from them."""
     new_parts = moving_gear(engine).resized(sizes)
-    resized_engine = replace(
-        engine, slider_cranks=new_parts.parts, rotors=new_parts.rotors, bearings=new_parts.bearings
-    )
-    return resized_engine if new_parts.gear is None else resized_engine.with_extra(new_parts.gear)
+    resized_engine = replace(engine, slider_cranks=new_parts.parts, rotors=new_parts.rotors)
+    if new_parts.gear is not None:
+        resized_engine = resized_engine.with_extra(new_parts.gear)
+    return resized_engine.with_extra(MainBearings(new_parts.bearings)) if new_parts.bearings else resized_engine
 
 
 def smallest_journal(bearings: Sequence[Bearing]) -> float:

@@ -16,6 +16,8 @@ from typing import TypeVar
 import numpy as np
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.bearing_loads.machine import Bearing, bearings_of
+from laufruhe.extensions.bearing_loads.physics import crank_forces, pin_forces
 from laufruhe.extensions.sizes.machine import (
     Bolts,
     PistonPin,
@@ -27,10 +29,9 @@ from laufruhe.extensions.sizes.machine import (
     round_modulus,
     smallest_journal,
 )
-from laufruhe.machine import CRANKSHAFT, Bearing, Engine, OperatingPoint, SliderCrank
+from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.bearing_loads import crank_forces, pin_forces
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.physics.torque import crank_torque
@@ -70,7 +71,7 @@ def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Sp
 
 def journal_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Return the torque through each main bearing [N m], output at the rear, shape (n, bearings) (Z5)."""
-    return _torques(engine, point, fidelity, [bearing.x for bearing in engine.bearings])
+    return _torques(engine, point, fidelity, [bearing.x for bearing in bearings_of(engine)])
 
 
 def side_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -119,8 +120,8 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, places: 
 
 
 def _span(engine: Engine, part: SliderCrank) -> tuple[Bearing, Bearing]:
-    front = [b for b in engine.bearings if b.shaft == part.shaft and b.x > part.x]
-    rear = [b for b in engine.bearings if b.shaft == part.shaft and b.x < part.x]
+    front = [b for b in bearings_of(engine) if b.shaft == part.shaft and b.x > part.x]
+    rear = [b for b in bearings_of(engine) if b.shaft == part.shaft and b.x < part.x]
     if not front or not rear:
         raise ModelError(
             f"the throw of {part.name} has no main bearing on one side; stresses of webs and pins need two"
@@ -171,7 +172,7 @@ def web_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 def journal_factors(engine: Engine, _: OperatingPoint) -> Array:
     """Return the reciprocal torsion modulus of each journal [1/m3], shape (bearings,) (Z5)."""
-    return np.array([0.5 / round_modulus(_journal(bearing)[0]) for bearing in engine.bearings])
+    return np.array([0.5 / round_modulus(_journal(bearing)[0]) for bearing in bearings_of(engine)])
 
 
 def side_factors(engine: Engine, _: OperatingPoint) -> Array:
@@ -229,7 +230,7 @@ def ovality_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 def journal_speeds(engine: Engine, point: OperatingPoint) -> Array:
     """Return the surface speed of each journal over its projected area [1/(m s)] (Z10; worked diesel G.c.V)."""
-    sizes = [(_journal(bearing), abs(bearing.shaft.ratio)) for bearing in engine.bearings]
+    sizes = [(_journal(bearing), abs(bearing.shaft.ratio)) for bearing in bearings_of(engine)]
     return np.array([0.5 * ratio * point.speed * d / (d * width) for (d, width), ratio in sizes])
 
 
@@ -254,7 +255,7 @@ def running_gear_mass(engine: Engine) -> float:
     total = 0.0
     for part in pins.values():
         total += 0.0 if part.big_end is None else ring_area(part.big_end[0], 0.0) * part.big_end[1]
-    journal = smallest_journal(engine.bearings)
+    journal = smallest_journal(bearings_of(engine))
     for part in pins.values() if gear.webs else ():
         diameter = part.big_end[0] if part.big_end else 0.0
         reach = part.crank_radius + 0.5 * diameter + 0.5 * journal

@@ -10,7 +10,7 @@ from laufruhe.extensions.torsion.machine import Torsion
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.channels import ON_BLOCK, Channel, LoadChannel, Need, NumberChannel, crankcase_signal
+from laufruhe.problem.channels import ON_BLOCK, Channel, Display, LoadChannel, Need, NumberChannel, crankcase_signal
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Resonances: TypeAlias = Callable[[MeasureQuery, EvaluatedDesign], Sequence[physics.Resonance]]
@@ -37,7 +37,7 @@ def _of_shafts(
     )
     return LoadChannel(
         name, unit, (*ON_BLOCK, "sections"), needs, signal=of_sections, places=places, depends_on_unbalances=False,
-        title=title, place="section",
+        display=Display(title, "section"),
     )  # fmt: skip
 
 

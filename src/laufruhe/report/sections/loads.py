@@ -14,7 +14,6 @@ from laufruhe.physics.mount_forces import CycleMeasures
 from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, turning_inertia, turning_torque
 from laufruhe.present.gas_figures import gas_head, gas_note, gas_rows
 from laufruhe.present.measures import (
-    Places,
     evaluations_with_loads,
     hardest_point,
     has_loads,
@@ -28,7 +27,7 @@ from laufruhe.present.measures import (
 )
 from laufruhe.present.numbers import DASH, RPM, aligned, number, percent
 from laufruhe.present.tables import Table
-from laufruhe.problem.channels import IRREGULARITY
+from laufruhe.problem.channels import IRREGULARITY, LoadChannel
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
@@ -50,32 +49,32 @@ EVEN = (
 
 def places(result: Result) -> list[Table]:
     """Return a row per mount, bearing or pin at every operating point, initial and final; a table of each kind."""
-    return [_at_places(result, places) for places in places_of(result)]
+    return [_at_places(result, load) for load in places_of(result)]
 
 
-def _at_places(result: Result, places: Places) -> Table:
+def _at_places(result: Result, load: LoadChannel) -> Table:
     points, designs = result.problem.points, evaluations_with_loads(result)
-    names = places.channel.places(result.problem.engine)
+    names = load.places(result.problem.engine)
     measures = [
         ((point.name, name) if len(points) > 1 else (name,), by_design)
         for k, point in enumerate(points)
-        for name, *by_design in zip(
-            names, *(place_measures(design, k, places.channel) for design in designs), strict=True
-        )
+        for name, *by_design in zip(names, *(place_measures(design, k, load) for design in designs), strict=True)
     ]
     largest = max((by_design[0].max for _, by_design in measures), default=0.0)
-    unit, factor = readable(places.channel.unit, usual_unit(largest, places.channel.unit))
+    unit, factor = readable(load.unit, usual_unit(largest, load.unit))
     scale = factor * largest
     rows = [(*lead, *_cells([values.times(factor) for values in by_design], scale)) for lead, by_design in measures]
-    at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
+    at, first = (
+        ("", ("at", load.display.place)) if len(points) > 1 else (f" at {points[0].name}", (load.display.place,))
+    )
     note = f"The initial design has no finite loads: {result.initial.resonance}. " if result.initial.resonance else ""
-    note = (note + places.note(result.problem)).rstrip()
-    if places.channel.sums_places:
-        sums = [number(factor * design.value(Measure(places.channel))) for design in designs]
+    note = (note + load.display.note(result.problem)).rstrip()
+    if load.sums_places:
+        sums = [number(factor * design.value(Measure(load))) for design in designs]
         note = f"Sum, mean over the cycle: {' initial, '.join(sums)}{' final' if len(sums) > 1 else ''}."
     two = ("initial mean", "final mean", "change", "initial max", "final max")
     head = (*first, *(two if len(designs) > 1 else ("mean", "max", "rms")))
-    return Table(head, rows, title=f"{places.title}{at} [{unit}]", note=note, left=len(first))
+    return Table(head, rows, title=f"{load.display.title}{at} [{unit}]", note=note, left=len(first))
 
 
 def _cells(measures: list[CycleMeasures], scale: float) -> list[str]:

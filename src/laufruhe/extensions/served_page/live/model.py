@@ -95,7 +95,7 @@ def _filled(
     source_text = "it is computed when sliders rest" if is_served else f"its value is that of the final design; {HOW}"
     aside = f"cannot be followed live; {source_text.format(file=bare.file)}"
     collected = _Collected(affine, kinds, result, aside)
-    forces = [(places.title, places.channel) for places in places_of(result) if places.channel.depends_on_unbalances]
+    forces = [(load.display.title, load) for load in places_of(result) if load.depends_on_unbalances]
     block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
     curves = tuple(
         {"title": title, "signal": collected.signal(Measure(channel))} for title, channel in (*forces, *block)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
+from laufruhe.extensions.bearing_loads.machine import bearings_of
+from laufruhe.extensions.bearing_loads.physics import main_bearing_forces, pin_forces
 
 MASS, PIN, RADIUS, ROD, STEPS = 0.6, 0.5, 0.045, 0.16, 720
 SHARED: dict[str, Any] = {
@@ -65,7 +66,7 @@ def test_pins_carry_the_rod_and_bearings_the_throw_as_well(name: str) -> None:
     pushed = -MASS * acceleration / rod(phi).real * rod(phi) * np.exp(1j * part.bank)
     turning = PIN * RADIUS * point.speed**2 * np.exp(1j * (part.shaft.ratio * phi + part.throw))
     pin = pin_forces(problem.engine, point).sample(STEPS)[:, -1]
-    on_shaft = [k for k, bearing in enumerate(problem.engine.bearings) if bearing.shaft.name == shaft]
+    on_shaft = [k for k, bearing in enumerate(bearings_of(problem.engine)) if bearing.shaft.name == shaft]
     carried = main_bearing_forces(problem.engine, point).sample(STEPS)[:, on_shaft].sum(axis=1)
     size = np.abs(pushed).max()
     assert np.abs(pin[:, 2] + 1j * pin[:, 1] - pushed).max() < 1e-5 * size

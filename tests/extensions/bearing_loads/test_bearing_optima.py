@@ -11,6 +11,8 @@ from scipy.optimize import minimize
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.bearing_loads.channels import MAIN_BEARING_FORCE
+from laufruhe.extensions.bearing_loads.machine import bearings_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import with_loads
 from laufruhe.report.json_result import as_dict
@@ -68,9 +70,9 @@ def bearings_by_hand(problem: Problem, masses: NDArray[np.float64]) -> NDArray[n
     """Return the force on each bearing from the bare crank and weights by lever rule, shape (720, 4, 2)."""
     bare = problem.design([0.0] * len(masses))
     initial = laufruhe.evaluate(bare, problem.points).final.loads[0]
-    force = laufruhe.problem.channels.MAIN_BEARING_FORCE.signal(initial).sample(720)[..., 1:]
+    force = MAIN_BEARING_FORCE.signal(initial).sample(720)[..., 1:]
     angles = 4.0 * np.pi * np.arange(720) / 720
-    speed, x = problem.points[0].speed, [bearing.x for bearing in problem.engine.bearings]
+    speed, x = problem.points[0].speed, [bearing.x for bearing in bearings_of(problem.engine)]
     for mass, rotor in zip(masses, problem.engine.rotors[-len(masses) :], strict=True):
         throw = {150: 1, 20: 2, -140: 3}[round(1e3 * rotor.x)]
         at = problem.engine.slider_cranks[throw - 1].throw + np.pi

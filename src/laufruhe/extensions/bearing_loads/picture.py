@@ -12,7 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from laufruhe.physics.bearing_loads import wear_of
+from laufruhe.extensions.bearing_loads.channels import MAIN_BEARING_FORCE
+from laufruhe.extensions.bearing_loads.physics import wear_of
+from laufruhe.extensions.bearing_loads.section import as_crank_turns, bearing_paths, has_bearings
 from laufruhe.plots.style import (
     ORANGE,
     Series,
@@ -25,7 +27,7 @@ from laufruhe.plots.style import (
     styled,
 )
 from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, in_thousands, round_ticks
-from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, evaluations_with_loads, has_bearings
+from laufruhe.present.measures import evaluations_with_loads
 from laufruhe.present.pictures import rows_of
 from laufruhe.solvers.result import Result
 
@@ -44,7 +46,7 @@ def figure(result: Result) -> Figure:
     k = int(np.argmax([np.abs(bearing_paths(first, j)).max() for j in range(len(first.loads))]))
     series = series_of(result, loads=True)
     planes = [bearing_paths(item.design, k) for item in series]
-    names = BEARINGS.channel.places(result.final.engine)
+    names = MAIN_BEARING_FORCE.places(result.final.engine)
     sizes = np.abs(planes[-1]).max(axis=0)
     chosen = sorted(np.argsort(-sizes, kind="stable")[:MAX_BEARINGS].tolist())
     largest = axis_end(float(np.abs(plane[:, chosen]).max()) for plane in planes)

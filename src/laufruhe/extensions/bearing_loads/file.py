@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 from laufruhe import units
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.fields import Name, Open, Table
-from laufruhe.machine import CRANKSHAFT, Bearing, Shaft, SliderCrank
+from laufruhe.files.nested import Place
+from laufruhe.files.problem_file import ExtensionContext, Key, ProblemFile
+from laufruhe.machine import CRANKSHAFT, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
+from laufruhe.problem.problem import Problem
 
 
 class MainBearingTable(Table):
@@ -29,11 +35,8 @@ class MainBearingTable(Table):
     friction: f.NonNegative | None = f.optional("Coefficient of friction; needed for friction power.")
 
 
-def expand_bearings(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
-    """Return the tables of main bearings, one for each bearing.
-
-    A table with `beside_throws` becomes bearings between and beyond the throws of a shaft.
-    """
+def _expanded(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
+    """Return a table for each bearing; `beside_throws` makes bearings between and beyond the throws of a shaft."""
     single: list[MainBearingTable] = []
     for k, table in enumerate(tables, 1):
         where, beyond = f"main_bearings[{k}]", table.beside_throws
@@ -58,11 +61,14 @@ def expand_bearings(tables: Sequence[MainBearingTable], throws: Sequence[Throw])
     return single
 
 
-def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]) -> tuple[Bearing, ...]:
-    """Return the main bearings of the engine from their tables.
+def bearings_in(
+    file: ProblemFile, throws: Sequence[Throw], parts: Sequence[SliderCrank]
+) -> list[tuple[MainBearingTable, Bearing]]:
+    """Return the main bearings of a file, each with its table.
 
     Raise `Refused` for shafts without cranks, overlapping journals, and throws without support.
     """
+    tables = _expanded(getattr(file, "main_bearings", None) or (), throws)
     shafts = {part.shaft.name: part.shaft for part in parts}
     bearings: list[Bearing] = []
     for k, table in enumerate(tables, 1):
@@ -88,7 +94,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
         bearings.append(bearing)
     for shaft in shafts.values() if bearings else ():
         _check_carried(shaft, [b.x for b in bearings if b.shaft == shaft], [p for p in parts if p.shaft == shaft])
-    return tuple(bearings)
+    return list(zip(tables, bearings, strict=True))
 
 
 def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[SliderCrank]) -> None:
@@ -103,3 +109,16 @@ def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[Slid
             place = units.quantity_text(part.x, "m")
             rule = f"leaves the throw of {part.name} at x = {place} on one side of all bearings"
             raise Refused("main_bearings", None, rule, "put a bearing on its other side")
+
+
+def _read(_: object, problem: Problem, context: ExtensionContext) -> Problem:
+    bearings = tuple(bearing for _, bearing in bearings_in(context.file, context.throws, problem.engine.slider_cranks))
+    return replace(problem, engine=problem.engine.with_extra(MainBearings(bearings)))
+
+
+def _names(tables: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, Place]]:
+    for k, table in enumerate(tables):
+        yield table.get("name", str(k + 1)), ("main_bearings", k)
+
+
+KEY = Key("main_bearings", list[MainBearingTable], _read, _names)

@@ -27,7 +27,8 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
+from laufruhe.extensions.bearing_loads.machine import Bearing, bearings_of
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.exact_angles import as_turn, cis, star_sum
 from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
@@ -39,9 +40,9 @@ from laufruhe.physics.star_loads import order_index, spread
 OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fidelity], Spectrum]
 
 
-def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
-    """Return True if loads inside the crankcase are modelled: known pin loads, at even crank speed."""
-    return not fidelity.has_uneven_speed and all(part.has_pin_loads for part in engine.slider_cranks)
+def has_bearing_loads(engine: Engine) -> bool:
+    """Return True if an engine has main bearings, and the loads of all its pins are modelled."""
+    return bool(bearings_of(engine)) and all(part.has_pin_loads for part in engine.slider_cranks)
 
 
 def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -102,7 +103,7 @@ def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelit
     """Return the force of the shafts on every main bearing, shape (n, bearings, 3) [N], linear in unbalances (B4)."""
     _check_even(fidelity)
     gas, parts = fidelity.gas_of(point), engine.slider_cranks
-    of_rods = _of_rods(engine.cycle, parts, engine.bearings, point.speed, gas, fidelity)
+    of_rods = _of_rods(engine.cycle, parts, bearings_of(engine), point.speed, gas, fidelity)
     return of_rods + _of_rotors(engine, point.speed, fidelity)
 
 
@@ -118,7 +119,7 @@ def _of_rods(
 
 def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
     # main bearing forces of webs, weights and throws, each of the order of its shaft
-    bearings = engine.bearings
+    bearings = bearings_of(engine)
     shafts = {bearing.shaft for bearing in bearings}
     rotors = [rotor for rotor in engine.rotors if rotor.shaft in shafts]
     shares = shares_of(bearings, tuple((rotor.shaft, rotor.x) for rotor in rotors), fidelity.crankshaft)
@@ -141,7 +142,7 @@ def hammer_blows(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 def bearing_factors(engine: Engine, _: OperatingPoint) -> Array:
     """Return the reciprocal projected area of every main bearing [1/m2] (B5; textbook, example 3)."""
-    return np.array([1.0 / bearing.area for bearing in engine.bearings])
+    return np.array([1.0 / bearing.area for bearing in bearings_of(engine)])
 
 
 def crank_pin_factors(engine: Engine, _: OperatingPoint) -> Array:
@@ -151,7 +152,7 @@ def crank_pin_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 def drag_factors(engine: Engine, point: OperatingPoint) -> Array:
     """Return coefficient of friction times journal speed of every main bearing [m/s]; times force it is power (B7)."""
-    return point.speed * np.array([bearing.drag for bearing in engine.bearings])
+    return point.speed * np.array([bearing.drag for bearing in bearings_of(engine)])
 
 
 @lru_cache(maxsize=256)

@@ -12,10 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Rotor, Seiliger, Shaft, SliderCrank
-from laufruhe.machine.kinematics import piston_acceleration, rod_acceleration
-from laufruhe.numerics.exact_angles import cis
-from laufruhe.physics.bearing_loads import (
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings, bearings_of
+from laufruhe.extensions.bearing_loads.physics import (
     beam_shares,
     crank_pin_factors,
     has_bearing_loads,
@@ -24,6 +22,9 @@ from laufruhe.physics.bearing_loads import (
     pin_forces,
     piston_pin_forces,
 )
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Rod, Rotor, Seiliger, Shaft, SliderCrank
+from laufruhe.machine.kinematics import piston_acceleration, rod_acceleration
+from laufruhe.numerics.exact_angles import cis
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
 from laufruhe.physics.torque import crank_torque
@@ -51,7 +52,7 @@ def engine_of(seed: int) -> Engine:
     rotors = [Rotor(f"web {k}", random.uniform(-0.25, 0.25), complex(*random.normal(0.0, 0.05, 2))) for k in range(3)]
     rotors.append(Rotor("balancer", 0.04, 0.02 + 0.01j, Shaft("balancer", -2.0, 0.1, -0.08)))
     bearings = tuple(Bearing(str(k), x) for k, x in enumerate((0.2, 0.1, 0.0, -0.1, -0.2)))
-    return Engine("random", Cycle.FOUR_STROKE, tuple(parts), tuple(rotors), bearings=bearings)
+    return Engine("random", Cycle.FOUR_STROKE, tuple(parts), tuple(rotors), extras=(MainBearings(bearings),))
 
 
 def walls_and_heads(engine: Engine, steps: int) -> FloatArray:
@@ -95,7 +96,7 @@ def test_bearings_walls_heads_and_balancers_make_the_shaking_loads(seed: int) ->
     fidelity = replace(EXACT, samples=steps)
     bearings = main_bearing_forces(engine, POINT, fidelity).sample(steps)
     _, lateral, vertical = np.moveaxis(bearings, 2, 0)
-    x, none = np.array([bearing.x for bearing in engine.bearings]), np.zeros(steps)
+    x, none = np.array([bearing.x for bearing in bearings_of(engine)]), np.zeros(steps)
     inside = np.stack([none, lateral.sum(1), vertical.sum(1), none, -vertical @ x, lateral @ x], axis=1)
     balancer = rotor_loads(engine.rotors[-1:], POINT.speed, engine.cycle).sample(steps)
     outside = walls_and_heads(engine, steps)
@@ -179,7 +180,7 @@ def test_turning_the_engine_turns_its_loads() -> None:
 def test_one_bearing_does_not_carry_a_throw() -> None:
     engine = engine_of(0)
     with pytest.raises(ModelError, match="two main bearings"):
-        main_bearing_forces(replace(engine, bearings=engine.bearings[:1]), POINT)
+        main_bearing_forces(engine.with_extra(MainBearings(bearings_of(engine)[:1])), POINT)
 
 
 def test_uneven_speed_is_refused() -> None:
@@ -295,8 +296,9 @@ def test_a_journal_drags_at_its_radius_and_the_speed_of_its_shaft() -> None:
         _ = Bearing("b", 0.0, diameter=0.06).drag
 
 
-@pytest.mark.parametrize(("pins", "uneven"), [((True, True), False), ((True, False), False), ((True, True), True)])
-def test_loads_inside_are_known_of_pins_at_even_speed_alone(pins: tuple[bool, ...], uneven: bool) -> None:
-    engine = SimpleNamespace(slider_cranks=[SimpleNamespace(has_pin_loads=known) for known in pins])
-    fidelity = SimpleNamespace(has_uneven_speed=uneven)
-    assert has_bearing_loads(engine, fidelity) is (all(pins) and not uneven)
+@pytest.mark.parametrize("pins", [(True, True), (True, False)])
+def test_loads_inside_are_known_of_bearings_and_pins(pins: tuple[bool, ...]) -> None:
+    engine = Engine("", Cycle.FOUR_STROKE, (), extras=(MainBearings((Bearing("b", 0.0),)),))
+    known = SimpleNamespace(slider_cranks=[SimpleNamespace(has_pin_loads=known) for known in pins], extra=engine.extra)
+    assert has_bearing_loads(known) is all(pins)
+    assert not has_bearing_loads(replace(engine, extras=()))
