@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.extensions.chambers.gas import Steam
+from laufruhe.extensions.flywheel.torque import swing_of
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, SliderCrank
 from laufruhe.machine.gas.base import OneChamber
 from laufruhe.numerics.arrays import Array
@@ -18,7 +19,6 @@ from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.physics.star_loads import star_loads
-from laufruhe.physics.torque import swing_of
 
 
 def rod_inertia_loads(engine: Engine, speed: float) -> Spectrum:

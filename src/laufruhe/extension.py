@@ -116,6 +116,7 @@ _OF_BEARINGS = (
     "main-bearing force", "main-bearing pressure", "hammer blow", "friction power", "crank-pin force",
     "crank-pin pressure", "side force", "rod force",
 )  # fmt: skip
+_OF_FLYWHEEL = ("degree of irregularity", "flywheel inertia", "flywheel mass", "rim stress", "arm stress")
 _OF_RECEIVERS = ("receiver acceleration", "receiver velocity", "receiver pressure")
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {
@@ -146,6 +147,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     },
     "keys": {
         "main_bearings": "bearing_loads",
+        "flywheel": "flywheel",
         "torsion": "torsion",
         "tolerances": "robust",
         "robust": "robust",
@@ -172,6 +174,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker", "rhombic": "rhombic"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_BEARINGS, "bearing_loads")
+    | dict.fromkeys(_OF_FLYWHEEL, "flywheel")
     | dict.fromkeys(_OF_RECEIVERS, "receivers")
     | dict.fromkeys(_OF_PISTONS, "piston_motion")
     | dict.fromkeys(("shaft distance", "shaft clearance", "envelope radius"), "open_positions")

@@ -38,11 +38,11 @@ from laufruhe.extensions.fidelity.trade import (
     measured,
     trade,
 )
+from laufruhe.extensions.flywheel.machine import FLYWHEEL
 from laufruhe.files.toml_text import toml_text
 from laufruhe.numerics.cores import processors
 from laufruhe.present.numbers import DASH, fixed
 from laufruhe.present.tables import Table
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.problem import Problem
 from laufruhe.report.document import Bullets, Document, Paragraph
@@ -278,7 +278,7 @@ def main() -> None:
 def of_problem(name: str) -> Trade | None:
     """Return the trade of a ready problem; none where a flywheel is open, whose cheap model breaks its limits."""
     problem = laufruhe.load(PROBLEMS / f"{name}.toml")
-    if Kind.FLYWHEEL in open_kinds(problem):
+    if FLYWHEEL in open_kinds(problem):
         return None
     measured_trade = trade(problem)
     # functions have no pickle

@@ -13,13 +13,13 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import BoundError
+from laufruhe.extensions.flywheel.monotone import MonotoneProblem
 from laufruhe.extensions.open_positions.solver import PlaceSearch
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.witness import STRICT, check_bound, collected
 from laufruhe.numerics.workers import unordered_map
 from laufruhe.prove import certificate
-from laufruhe.prove.boxes.monotone import MonotoneProblem
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.prove.throws.star_cuts import Cut

@@ -118,7 +118,7 @@ def test_unknown_is_neither_constant_nor_affine(resultant: LoadChannel, monkeypa
     # channel of the same name that is not the one of the table
     monkeypatch.setitem(_KNOWN, MOUNT_FORCE.name, MOUNT_FORCE)
     other = replace(MOUNT_FORCE, signal=_resultant)
-    assert dependence.dependence(other, Kind.FLYWHEEL, problem) is Dependence.UNKNOWN
+    assert dependence.dependence(other, Kind.PLACE, problem) is Dependence.UNKNOWN
     assert [method.name for method in METHODS if method.suits(problem)] == [METHODS[-1].name]
 
 

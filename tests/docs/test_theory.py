@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from laufruhe.extensions.bearing_loads.physics import beam_shares, lever_shares
+from laufruhe.extensions.flywheel.torque import swing_of, torque_facts
 from laufruhe.extensions.torsion.machine import Disc, ShaftSection, Torsion
 from laufruhe.extensions.torsion.physics import critical_speed, natural_modes
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import swing_of, torque_facts
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

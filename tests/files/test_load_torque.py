@@ -10,11 +10,11 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.flywheel.torque import torque_facts
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import LoadTorque
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.load_torque import less_load
-from laufruhe.physics.torque import torque_facts
 from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS
 

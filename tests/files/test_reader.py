@@ -10,6 +10,7 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
+from laufruhe.extensions.flywheel.machine import Flywheel
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.machine import Cycle, Seiliger
@@ -302,7 +303,7 @@ def test_all_missing_keys_are_named_at_once() -> None:
 
 def test_a_ring_has_the_inertia_of_its_mean_radius(tmp_path: Path) -> None:
     ring = '[flywheel]\nmass = "40 kg"\nmean_diameter = "500 mm"\ncrankshaft_inertia = "0.2 kg m^2"\n'
-    wheel = load(written(tmp_path, WHOLE + ring)).engine.flywheel
+    wheel = load(written(tmp_path, WHOLE + ring)).engine.extra(Flywheel)
     assert wheel is not None
     assert wheel.inertia == pytest.approx(40.0 * 0.25**2 + 0.2)
 

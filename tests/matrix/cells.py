@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.extensions.flywheel.channels import FlywheelChannel
 from laufruhe.problem.channels import CHANNELS, Channel, Needs
 
 Document = dict[str, Any]
@@ -363,7 +364,7 @@ def document_of(cell: Cell) -> Document:
         document["main_bearings"] = [
             {"x": f"{x} mm", "diameter": "70 mm", "width": "30 mm", "friction": 0.01} for x in places
         ]
-    if _channel(cell.measure).needs in (Needs.FLYWHEEL, Needs.RIM, Needs.ARMS):
+    if isinstance(_channel(cell.measure), FlywheelChannel):
         document.setdefault("flywheel", {"rim": RIM})
     document["objective"] = {"minimise": cell.measure, **_narrowed(cell.measure, document, rng)}
     if rng.random() < 0.4:

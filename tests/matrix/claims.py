@@ -14,6 +14,7 @@ import numpy as np
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.flywheel.machine import Flywheel
 from laufruhe.extensions.speed_ranges.peaks import RangeResponses
 from laufruhe.extensions.speed_ranges.ranges import SpeedRanges, at_speeds
 from laufruhe.machine import Engine
@@ -304,7 +305,7 @@ def _acts(document: Document, problem: Problem) -> bool:
 
 
 def _differ(one: Evaluation, other: Evaluation) -> bool:
-    if one.engine.mounts != other.engine.mounts or one.engine.flywheel != other.engine.flywheel:
+    if one.engine.mounts != other.engine.mounts or one.engine.extra(Flywheel) != other.engine.extra(Flywheel):
         return True
     if any(a.unbalance != b.unbalance for a, b in zip(one.engine.rotors, other.engine.rotors, strict=True)):
         return True

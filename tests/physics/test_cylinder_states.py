@@ -12,11 +12,12 @@ import pytest
 import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.extensions.bearing_loads.physics import pin_forces
+from laufruhe.extensions.flywheel.torque import torque_facts, turning_torque
 from laufruhe.machine import Cycle, Seiliger, SliderCrank
 from laufruhe.machine.gas.base import CylinderGases
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, cylinder_torque, torque_facts, turning_torque
+from laufruhe.physics.torque import crank_torque, cylinder_torque
 
 RADIUS, ROD, BORE, RATIO, N1, INTAKE, EXHAUST = 0.0425, 0.14, 0.08, 10.0, 1.35, 0.6e5, 1.1e5
 AIR, IMEP, PEAK = 101_325.0, 4e5, 30e5

@@ -12,16 +12,17 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.flywheel.channels import IRREGULARITY
+from laufruhe.extensions.flywheel.torque import swing_of, torque_facts, torque_parts
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.machine.flywheel import GRAVITY
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.gravity import potential_energy, with_gravity
+from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import swing_of, torque_facts, torque_parts
-from laufruhe.problem.channels import IRREGULARITY, STORED_WORK
+from laufruhe.problem.channels import STORED_WORK
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.evaluation import evaluate

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from laufruhe.extensions.flywheel.torque import swing_of, torque_facts, torque_parts
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import LoadTorque
@@ -17,7 +18,7 @@ from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.geared_inertia import geared_factor
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import split_loads
-from laufruhe.physics.torque import crank_torque, excess_torque, swing_of, torque_facts, torque_parts
+from laufruhe.physics.torque import crank_torque, excess_torque
 from laufruhe.physics.uneven_speed import crank_motion, moving_inertia
 from laufruhe.problem.channels import STORED_WORK
 from laufruhe.problem.evaluation import evaluate

@@ -13,13 +13,13 @@ from scipy.interpolate import lagrange
 from scipy.optimize import minimize_scalar
 
 from lanes import first_fast
+from laufruhe.extensions.flywheel.torque import torque_parts
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.spectrum import spectrum_with_kinks
 from laufruhe.physics.gas_facts import gas_facts
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.measured_cycle import _low_pass, _noise, smooth_cycle
-from laufruhe.physics.torque import torque_parts
 from recorded_cycle import AREA, BORE, CRANK, ROD, cycle_pressure, lever, mean_torque
 
 Array = NDArray[np.float64]

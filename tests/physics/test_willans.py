@@ -16,10 +16,10 @@ from scipy import optimize
 import laufruhe
 import ready
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.flywheel.torque import torque_facts, torque_parts, turning_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import torque_facts, torque_parts, turning_torque
 from laufruhe.physics.willans import mean_pressure, mean_torque, motoring_friction, willans_friction
 from laufruhe.plots.results import willans
 from laufruhe.problem.evaluation import evaluate

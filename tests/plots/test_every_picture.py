@@ -13,8 +13,9 @@ from scipy.optimize import isotonic_regression
 
 import ready
 from lanes import first_fast
+from laufruhe.extensions.flywheel import picture as torque
 from laufruhe.plots import figure, names, style
-from laufruhe.plots.results import firings, torque
+from laufruhe.plots.results import firings
 from laufruhe.plots.style import page
 from laufruhe.plots.words import (
     FAINT,

@@ -273,12 +273,12 @@ def test_no_star_moves_what_is_constant() -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("mount force   a a a  b m >  >  a a  0", "'mount force' has dependences already"),
+        ("mount force   a a a  b m >  >  a a", "'mount force' has dependences already"),
         ("mount force   flywheel=a", "'mount force' has dependences already"),
-        ("no such force   a a a  b m >  >  s s  0", "'no such force' has dependences already, or is no channel"),
+        ("no such force   a a a  b m >  >  s s", "'no such force' has dependences already, or is no channel"),
         ("mount force", "is no line of dependences"),
         ("own force   a a a", "is no line of dependences"),
-        ("own force   a a a  b m >  >  s s  !", "is no line of dependences"),
+        ("own force   a a a  b m >  >  s !", "is no line of dependences"),
     ],
 )
 def test_an_extension_speaks_of_its_own_channels_alone(line: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -291,7 +291,7 @@ def test_an_extension_speaks_of_its_own_channels_alone(line: str, said: str, mon
 def test_a_line_of_an_extension_is_one_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
     own = replace(CHANNELS["mount force"], name="own force")
     monkeypatch.setattr(module, "CHANNELS", {**CHANNELS, own.name: own})
-    line = "own force   a a a  b m >  >  s s  0"
+    line = "own force   a a a  b m >  >  s s"
     monkeypatch.setattr(module, "extensions", lambda: [Extension("own", dependences=(line,))])
     row = module._with_extensions(module.TABLE)["own force"]
     assert row == {kind: module.TABLE["mount force"][kind] for kind in module._COLUMNS}

@@ -16,8 +16,8 @@ import pytest
 
 from cli import scenes
 from laufruhe.errors import LaufruheWarning
+from laufruhe.extensions.flywheel.torque import torque_parts
 from laufruhe.files.reader import load
-from laufruhe.physics.torque import torque_parts
 from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.report.files import TABLES, result_files

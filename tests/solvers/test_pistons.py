@@ -11,9 +11,9 @@ from scipy.optimize import minimize_scalar
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.flywheel.torque import torque_facts
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine
-from laufruhe.physics.torque import torque_facts
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof

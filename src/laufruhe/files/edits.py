@@ -190,8 +190,6 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
         yield shaft.get("name", ""), ("balancer_shafts", k)
     for k, shaft in enumerate(tables.get("engine", {}).get("shafts", ())):
         yield shaft.get("name", ""), ("engine", "shafts", k)
-    if "rim" in tables.get("flywheel", {}):
-        yield "flywheel", ("flywheel", "rim")
     for name, key in EXTENSION_KEYS.items():
         if name in tables:
             yield from key.numbers(tables[name])

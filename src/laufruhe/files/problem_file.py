@@ -16,8 +16,8 @@ from laufruhe.files.complaints import si_value
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
-from laufruhe.files.flywheel import FlywheelTable, GearedInertiaTable
 from laufruhe.files.gas import GAS_MODELS, GasTable, gas_type
+from laufruhe.files.geared_inertia import GearedInertiaTable
 from laufruhe.files.load_torque import LoadTorqueTable
 from laufruhe.files.measures import ConstraintTable, ObjectiveTable
 from laufruhe.files.mounts import BlockTable, LoadCaseTable, MountsTable
@@ -191,7 +191,6 @@ class ProblemFile(Table):
     block: BlockTable | None = None
     load_cases: list[LoadCaseTable] = Field(default_factory=list)
     load_torque: LoadTorqueTable | None = None
-    flywheel: FlywheelTable | None = None
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)

@@ -31,8 +31,8 @@ from laufruhe.files.complaints import (
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import with_fidelity
 from laufruhe.files.fields import check_format
-from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import ChargeTable, GasContext, gas_at_point, gas_of
+from laufruhe.files.geared_inertia import geared_of
 from laufruhe.files.load_torque import load_torque_of
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import axes_sentences, load_cases_of, mounts_of
@@ -322,7 +322,6 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     balancer_shafts(file.balancer_shafts, collected)
     is_mirrored = table.value_of("rotation") == REVERSED
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent, is_mirrored), cycle_of(table)
-    wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.crank_inertia)
     brake = _brake(file, cylinders, cycle, path.parent)
     gas_table = with_load(file.gas, file.operating_points)
     gas_context = GasContext(path.parent, cycle, cylinders)
@@ -336,8 +335,8 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         points = tuple(replace(point, gas=None) for point in points)
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, wheel,
-        geared, load_cases_of(file.load_cases, on_mounts.block),
+        file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, geared,
+        load_cases_of(file.load_cases, on_mounts.block),
         load_torque=load_torque_of(file.load_torque, path.parent, cycle, cylinders), gravity=table.gravity,
     )  # fmt: skip
     load_said = [f"Load: {sentence}" for sentence in engine.load_torque.recording] if engine.load_torque else []
@@ -347,7 +346,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         title=file.title,
         engine=engine,
         points=points,
-        decisions=(*loads, *on_mounts.decisions, *wheel_decisions),
+        decisions=(*loads, *on_mounts.decisions),
         source=file.source,
         assumptions=(
             *file.assumptions,

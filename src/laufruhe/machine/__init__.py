@@ -3,7 +3,6 @@
 from laufruhe.machine.block import Block
 from laufruhe.machine.bodies import Rod
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
-from laufruhe.machine.flywheel import Arms, Flywheel, Rim
 from laufruhe.machine.gas.base import GasModel
 from laufruhe.machine.gas.charge import Charge, TrappedCharge
 from laufruhe.machine.gas.seiliger import Seiliger
@@ -15,18 +14,15 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 __all__ = [
     "CRANKSHAFT",
-    "Arms",
     "Block",
     "Charge",
     "Cycle",
     "Engine",
-    "Flywheel",
     "GasModel",
     "GearedInertia",
     "LoadTorque",
     "Mount",
     "OperatingPoint",
-    "Rim",
     "Rod",
     "Role",
     "Rotor",

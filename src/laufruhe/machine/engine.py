@@ -16,7 +16,6 @@ from laufruhe.errors import ModelError
 from laufruhe.machine.block import Block, LoadCase
 from laufruhe.machine.extra import Extra, MachineTorque
 from laufruhe.machine.facing import with_shared_chambers
-from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.load_torque import LoadTorque
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import GearedInertia, Rotor, Shaft
@@ -93,8 +92,6 @@ class Engine:
         Mounts; empty if only shaking loads are requested.
     block
         Body that elastic mounts carry; None for rigid mounts.
-    flywheel
-        Parts that turn with the crank; None if no measure refers to them.
     geared
         Inertias on shafts of other speeds, as shares of the inertia of all that turns.
     load_cases
@@ -113,7 +110,6 @@ class Engine:
     rotors: tuple[Rotor, ...] = ()
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
-    flywheel: Flywheel | None = None
     geared: tuple[GearedInertia, ...] = ()
     load_cases: tuple[LoadCase, ...] = ()
     extras: tuple[Extra, ...] = ()
@@ -157,6 +153,12 @@ class Engine:
     def supports(self) -> Mapping[str, Sequence[float]]:
         """Positions along x at which parts of extensions support its shafts [m], in order, by the name of the shaft."""
         return {shaft: places for one in self.extras for shaft, places in one.supports.items()}
+
+    @property
+    def turning_inertia(self) -> float | None:
+        """Inertia of all rotating parts except pistons and rods [kg m2]; None if no part of an extension has it."""
+        inertias = (one.turning_inertia(self.slider_cranks) for one in self.extras)
+        return next((inertia for inertia in inertias if inertia is not None), None)
 
     def torques(self, point: OperatingPoint) -> tuple[MachineTorque, ...]:
         """Return the torques of machines of extensions at an operating point."""

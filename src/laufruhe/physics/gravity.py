@@ -12,11 +12,11 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.machine import Cycle, Engine, Rotor, SliderCrank
-from laufruhe.machine.flywheel import GRAVITY
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.exact_angles import as_turn, cis
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.modes import GRAVITY
 
 _STEPS = 720
 

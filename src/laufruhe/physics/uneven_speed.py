@@ -80,7 +80,7 @@ def _steps(engine: Engine, fidelity: Fidelity) -> Array:
 
 def _turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
     # rotors and mounts do not move the crank; without them a motion is found once for all designs
-    return _compute_turning(replace(engine, rotors=(), mounts=(), flywheel=None, geared=()), point, fidelity)
+    return _compute_turning(replace(engine, rotors=(), mounts=(), geared=()), point, fidelity)
 
 
 @lru_cache(maxsize=32)

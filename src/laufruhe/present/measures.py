@@ -6,7 +6,6 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
-from laufruhe.physics.torque import turning_inertia
 from laufruhe.problem.channels import LoadChannel, load_channels
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
@@ -139,10 +138,3 @@ def evaluations_with_loads(result: Result) -> list[Evaluation]:
 def objective_unit(result: Result) -> str:
     """Return the SI unit of the objective; empty without one."""
     return result.objective.unit if result.objective else ""
-
-
-def uses_torque(result: Result) -> bool:
-    """Return True with a flywheel, or for measures inside the crankcase."""
-    problem = result.problem
-    is_requested = any(measure.is_inside for measure in problem.measures)
-    return is_requested or turning_inertia(result.final.engine, problem.fidelity) is not None

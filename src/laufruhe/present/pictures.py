@@ -35,7 +35,6 @@ _CAPTIONS = {
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "willans": "Fuel over brake load with the Willans line, or drag over speed; the fitted line gives the friction.",
-    "torque": "Torque of gas, pistons and rods, its work and orders, and the crank speed with the flywheel.",
     "spectrum": "Amplitudes of the loads by order of crank speed.",
     "transmissibility": "Force on elastic mounts relative to rigid mounts, over speed.",
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.extension import extended
-from laufruhe.machine import Block, Engine, Flywheel, OperatingPoint, Role
+from laufruhe.machine import Block, Engine, OperatingPoint, Role
 from laufruhe.machine.block import LoadCase
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
@@ -24,13 +24,12 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.static_cases import settled
-from laufruhe.physics.torque import Swing, crank_torque, excess_torque, swing_of, turning_inertia
+from laufruhe.physics.torque import crank_torque, excess_torque
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
 """Function that returns the factor on the load of each place, such as 1 / area, shape (places,) or (places, d)."""
-FlywheelFunction: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 # keys of a measure in a file that may narrow a load, by the place where the load acts
 ON_BLOCK = ("operating_points", "orders", "alternating")
@@ -76,17 +75,6 @@ class Needs:
     UNCONDITIONAL = Need(lambda _: True, "", "")
     MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
     ELASTIC = Need(lambda e: e.block, "elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
-    FLYWHEEL = Need(
-        lambda e: e.flywheel or any(extra.turning_inertia(e.slider_cranks) is not None for extra in e.extras),
-        "a flywheel",
-        "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
-    )
-    RIM = Need(lambda e: e.flywheel and e.flywheel.rim, "the rim of a flywheel", "add [flywheel.rim]")
-    ARMS = Need(
-        lambda e: e.flywheel and e.flywheel.rim and e.flywheel.rim.arms,
-        "the arms of a flywheel",
-        "add [flywheel.rim.arms]",
-    )
     CASES = Need(lambda e: e.load_cases, "load cases", "add [[load_cases]], and [mounts] of kind elastic")
 
 
@@ -142,11 +130,13 @@ class Channel:
         True if an objective may contain it.
     depends_on_loads
         False if it certainly does not depend on the loads that excite the block.
-    flywheel_value
-        For channels of the flywheel: function of measure and design that returns their value as a function of the
-        flywheel.
+    depends_on_gas
+        True if the gas contributes to it.
+    inertia_value
+        For channels that are monotone in the inertia of all that turns with the crank: function of measure and design
+        that returns their value as a function of this inertia.
     depends_on_torque
-        True if it depends on the crank torque, and so on other decisions than the flywheel.
+        True if it depends on the torque of the crank and on the inertia of all that turns with it.
     size_value
         For channels of sizes alone: their value as a function of the engine, monotone in each size.
     case_vectors
@@ -174,7 +164,8 @@ class Channel:
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
     depends_on_loads: bool = True
-    flywheel_value: Callable[[MeasureQuery, EvaluatedDesign], FlywheelFunction] | None = None
+    depends_on_gas: bool = False
+    inertia_value: Callable[[MeasureQuery, EvaluatedDesign], Callable[[float], float]] | None = None
     size_value: Callable[[Engine], float] | None = None
     depends_on_torque: bool = False
     case_vectors: Callable[[Any], Any] | None = None
@@ -203,16 +194,6 @@ class Channel:
     def norms(self) -> Collection[str]:
         """Names of the norms that apply to it; empty for a number."""
         return ()
-
-    @property
-    def is_flywheel(self) -> bool:
-        """True for a channel of the flywheel, which is monotone in each of its numbers."""
-        return self.flywheel_value is not None
-
-    @property
-    def is_monotone_in_inertia(self) -> bool:
-        """True if it is monotone in the inertia of all parts that turn with the crank."""
-        return self.is_flywheel and self.needs is Needs.FLYWHEEL
 
     def check_sizes(self, engine: Engine, _: OperatingPoint) -> None:
         """Raise `ModelError` if the engine lacks a size that the channel needs."""
@@ -363,47 +344,6 @@ def crankcase_channel(
         display=display,
     )
     return channel
-
-
-def _of_wheel(
-    name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
-    needs: Need = Needs.FLYWHEEL, depends_on_torque: bool = False,
-) -> NumberChannel:  # fmt: skip
-    """Return the channel of a flywheel number, such as speed variation: the largest value over a measure's points."""
-
-    def flywheel_value(measure: MeasureQuery, evaluation: EvaluatedDesign) -> FlywheelFunction:
-        counted = [loads.point for loads in evaluation.loads if measure.includes_point(loads.point)]
-        swings = [swing_of(evaluation.engine, point, evaluation.fidelity) for point in counted]
-        return lambda wheel: max((number(wheel, swing) for swing in swings), default=0.0)
-
-    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
-        inertia, wheel = turning_inertia(evaluation.engine, evaluation.fidelity), evaluation.engine.flywheel
-        # without a flywheel the turning inertia alone gives the speed variation
-        return () if inertia is None else (flywheel_value(measure, evaluation)(wheel or Flywheel(inertia)),)
-
-    return NumberChannel(
-        name, unit, keys, needs, values=values, flywheel_value=flywheel_value, depends_on_torque=depends_on_torque,
-        depends_on_loads=False,
-    )  # fmt: skip
-
-
-_AT_POINTS = ("operating_points",)
-IRREGULARITY = _of_wheel(
-    "degree of irregularity",
-    "",
-    lambda wheel, swing: swing.irregularity(wheel.inertia),
-    _AT_POINTS,
-    depends_on_torque=True,
-)
-FLYWHEEL_INERTIA = _of_wheel("flywheel inertia", "kg m^2", lambda wheel, _: wheel.inertia)
-FLYWHEEL_MASS = _of_wheel(
-    "flywheel mass", "kg", lambda wheel, _: wheel.ring.mass_ratio * wheel.ring.mass, needs=Needs.RIM
-)
-RIM_STRESS = _of_wheel("rim stress", "Pa", lambda wheel, swing: wheel.ring.stress(swing.speed), _AT_POINTS, Needs.RIM)
-ARM_STRESS = _of_wheel(
-    "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), _AT_POINTS, Needs.ARMS
-)  # fmt: skip
-OF_FLYWHEEL = (IRREGULARITY, FLYWHEEL_INERTIA, FLYWHEEL_MASS, RIM_STRESS, ARM_STRESS)
 
 
 def mounting_in(engine: Engine) -> ElasticMounting:
@@ -589,7 +529,7 @@ def is_at_mounts(channel: Channel) -> bool:
 
 CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, RESULTANT_MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
-    CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS, *OF_MOUNTING,
+    CRANK_TORQUE, STORED_WORK, COUNTERWEIGHT_MASS, BALANCER_MASS, ADDED_MASS, *OF_MOUNTING,
 ))  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from laufruhe.extension import extended
-from laufruhe.machine import Engine, Flywheel, Mount
+from laufruhe.machine import Engine, Mount
 from laufruhe.machine.engine import with_leads
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
@@ -59,8 +59,6 @@ class Kind:
     """Any other number of a mount."""
     STAR: ClassVar[Kind]
     """Phasing, which is no number: crank star, firing order and optional shafts."""
-    FLYWHEEL: ClassVar[Kind]
-    """Number of the flywheel: it affects only the flywheel and the evenness of the crank's speed."""
     PISTON: ClassVar[Kind]
     """Mass of a piston: every load is affine in it, but not the turning inertia."""
     SIZE: ClassVar[Kind]
@@ -86,7 +84,6 @@ Kind.PLACE = Kind(2, "place", "places of shafts")
 Kind.STIFFNESS = Kind(3, "stiffness", "stiffness")
 Kind.MOUNT = Kind(4, "mount", "other numbers of mounts")
 Kind.STAR = Kind(5, "star", "stars, firing orders, shafts")
-Kind.FLYWHEEL = Kind(6, "flywheel", "flywheel", is_alone=True)
 Kind.PISTON = Kind(7, "piston", "masses of pistons", is_affine=True)
 Kind.SIZE = Kind(9, "size", "sizes")
 Kind.SHARE = Kind(10, "share", "shares of geared inertia", is_affine=True)
@@ -94,8 +91,8 @@ Kind.LEAD = Kind(11, "lead", "leads")
 Kind.NUMBER = Kind(12, "number", "other numbers of the file")
 
 KINDS: Mapping[str, Kind] = extended("kinds", Kind, (
-    Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL, Kind.PISTON, Kind.SIZE,
-    Kind.SHARE, Kind.LEAD, Kind.NUMBER,
+    Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.PISTON, Kind.SIZE, Kind.SHARE,
+    Kind.LEAD, Kind.NUMBER,
 ))  # fmt: skip
 """Kinds by their names, with those of extensions."""
 
@@ -147,20 +144,11 @@ class Numbers:
             moves = {mass: change for (name, mass), change in pistons.items() if name == part.name}
             masses = {mass: max(getattr(part, mass) + change, lower.get(mass, 0.0)) for mass, change in moves.items()}
             parts.append(replace(part, **masses) if masses else part)
-        flywheel = base.flywheel and self.flywheel(base.flywheel)
-        engine = replace(
-            base, slider_cranks=tuple(parts), rotors=tuple(rotors), mounts=mounts, flywheel=flywheel, geared=geared
-        )
+        engine = replace(base, slider_cranks=tuple(parts), rotors=tuple(rotors), mounts=mounts, geared=geared)
         for extra in base.extras:
             engine = extra.move(engine, self._of_kind(extra.name), base.slider_cranks)
         leads = self._of_kind(Kind.LEAD.name)
         return with_leads(engine, leads) if leads else engine
-
-    def flywheel(self, base: Flywheel) -> Flywheel:
-        """Return the flywheel `base` with these numbers."""
-        changes = self._of_kind(Kind.FLYWHEEL.name)
-        # numbers without a change may be None
-        return base.moved([x + changes[k] if k in changes else x for k, x in enumerate(base.numbers)])
 
     def _of_kind(self, name: str) -> dict[Any, float]:
         return {key: change for (kind, key), change in self.changes.items() if kind.name == name}
@@ -233,8 +221,8 @@ class NumberDrive:
     Attributes
     ----------
     key
-        Identifier among numbers of one kind: index in the flywheel's numbers, (slider-crank, mass), size of the running
-        gear, shaft of a phase lead, or geared inertia of a share.
+        Identifier among numbers of one kind: (slider-crank, mass), size of the running gear, shaft of a phase lead,
+        geared inertia of a share, or number of a part of an extension.
     """
 
     kind: Kind

@@ -13,7 +13,7 @@ from enum import StrEnum
 from laufruhe.errors import ModelError
 from laufruhe.extension import extensions, objects
 from laufruhe.physics.fidelity import EXACT
-from laufruhe.problem.channels import CHANNELS, IRREGULARITY, STORED_WORK, Channel
+from laufruhe.problem.channels import CHANNELS, STORED_WORK, Channel
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.problem import Problem
 
@@ -44,40 +44,34 @@ class Dependence(StrEnum):
 _LETTERS = dict(zip("0abvm>wc+-s?", Dependence, strict=True))
 _COLUMNS = (
     Kind.UNBALANCE, Kind.SHARE, Kind.PISTON, Kind.PLACE, Kind.SIZE, Kind.LEAD, Kind.STAR, Kind.STIFFNESS, Kind.MOUNT,
-    Kind.FLYWHEEL,
 )  # fmt: skip
 # for an engine on elastic mounts at an even speed; `dependence` treats other engines
 _TABLE = """
-                                    U S P  x Z L  *  k M  F
-shaking force                       a a a  b m >  >  0 0  0
-rocking couple                      a a a  b m >  >  0 0  0
-roll moment                         a a a  b m >  >  0 0  0
-surging force                       a a a  b m >  >  0 0  0
-swaying couple                      a a a  b m >  >  0 0  0
-mount force                         a a a  b m >  >  s s  0
-resultant mount force               a a a  b m >  >  s s  0
-mount travel                        a a a  b m >  >  s s  0
-crank torque                        0 0 a  0 m >  >  0 0  0
-stored work                         0 0 a  0 m >  >  0 0  0
-counterweight mass                  a 0 a  0 0 0  a  0 0  0
-balancer mass                       a 0 a  0 0 0  a  0 0  0
-added mass                          a 0 a  0 0 0  a  0 0  0
-static sag                          0 0 0  0 0 0  0  c s  0
-natural frequencies                 0 0 0  0 0 0  0  + s  0
-motion frequencies                  0 0 0  0 0 0  0  ? ?  0
-kinetic-energy decoupling           0 0 0  0 0 0  0  s s  0
-decoupling shortfall                0 0 0  0 0 0  0  s s  0
-torque-roll residual                0 0 0  0 0 0  0  c s  0
-raw torque-roll residual            0 0 0  0 0 0  0  c s  0
-total stiffness                     0 0 0  0 0 0  0  a s  0
-static travel                       0 0 0  0 0 0  0  s s  0
-static mount force                  0 0 0  0 0 0  0  s s  0
-transmissibility                    s s s  s s s  s  s s  0
-degree of irregularity              0 0 s  0 s w  w  0 0  -
-flywheel inertia                    0 0 0  0 0 0  0  0 0  +
-flywheel mass                       0 0 0  0 0 0  0  0 0  +
-rim stress                          0 0 0  0 0 0  0  0 0  +
-arm stress                          0 0 0  0 s s  0  0 0  +
+                                    U S P  x Z L  *  k M
+shaking force                       a a a  b m >  >  0 0
+rocking couple                      a a a  b m >  >  0 0
+roll moment                         a a a  b m >  >  0 0
+surging force                       a a a  b m >  >  0 0
+swaying couple                      a a a  b m >  >  0 0
+mount force                         a a a  b m >  >  s s
+resultant mount force               a a a  b m >  >  s s
+mount travel                        a a a  b m >  >  s s
+crank torque                        0 0 a  0 m >  >  0 0
+stored work                         0 0 a  0 m >  >  0 0
+counterweight mass                  a 0 a  0 0 0  a  0 0
+balancer mass                       a 0 a  0 0 0  a  0 0
+added mass                          a 0 a  0 0 0  a  0 0
+static sag                          0 0 0  0 0 0  0  c s
+natural frequencies                 0 0 0  0 0 0  0  + s
+motion frequencies                  0 0 0  0 0 0  0  ? ?
+kinetic-energy decoupling           0 0 0  0 0 0  0  s s
+decoupling shortfall                0 0 0  0 0 0  0  s s
+torque-roll residual                0 0 0  0 0 0  0  c s
+raw torque-roll residual            0 0 0  0 0 0  0  c s
+total stiffness                     0 0 0  0 0 0  0  a s
+static travel                       0 0 0  0 0 0  0  s s
+static mount force                  0 0 0  0 0 0  0  s s
+transmissibility                    s s s  s s s  s  s s
 """
 
 
@@ -120,9 +114,11 @@ _OF_SUPPORTS = frozenset(
     name for name, row in TABLE.items()
     if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.KINKED)
 )  # fmt: skip
-# dependences on unbalances if the weight of moving parts counts (T14); methods that know the degree of irregularity
-# suppose that unbalances leave it as it is
-_OF_GRAVITY = {STORED_WORK.name: Dependence.AFFINE, IRREGULARITY.name: Dependence.UNKNOWN}
+# dependences on unbalances if the weight of moving parts counts (T14); methods that know a number of the torque suppose
+# that unbalances leave it as it is
+_OF_GRAVITY = {name: Dependence.UNKNOWN for name, channel in CHANNELS.items() if channel.depends_on_torque} | {
+    STORED_WORK.name: Dependence.AFFINE
+}
 # dependences that are lost at an uneven speed, where loads of parts do not add up
 _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
@@ -155,9 +151,9 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     return entry
 
 
-def falls_with_flywheel(channel: Channel) -> bool:
-    """Return True if a channel never rises with a number of the flywheel."""
-    return TABLE[channel.name].get(Kind.FLYWHEEL) is Dependence.MONOTONE_DOWN
+def falls_with(channel: Channel, kind: Kind) -> bool:
+    """Return True if a channel never rises with a number of a kind."""
+    return TABLE[channel.name].get(kind) is Dependence.MONOTONE_DOWN
 
 
 def open_kinds(problem: Problem) -> frozenset[Kind]:

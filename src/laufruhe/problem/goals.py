@@ -70,14 +70,14 @@ QuantityName: TypeAlias = Literal[
     "peak to peak shaft twist", "rmq shaft twist", "worst mean shaft twist", "mean shaft torque",
     "maximum shaft torque", "rms shaft torque", "peak to peak shaft torque", "rmq shaft torque",
     "worst mean shaft torque", "mean shaft stress", "maximum shaft stress", "rms shaft stress",
-    "peak to peak shaft stress", "rmq shaft stress", "worst mean shaft stress", "degree of irregularity",
-    "flywheel inertia", "flywheel mass", "rim stress", "arm stress", "counterweight mass", "balancer mass",
+    "peak to peak shaft stress", "rmq shaft stress", "worst mean shaft stress", "counterweight mass", "balancer mass",
     "added mass", "transmissibility", "static sag", "natural frequencies", "motion frequencies",
     "kinetic-energy decoupling", "decoupling shortfall", "torque-roll residual", "raw torque-roll residual",
-    "total stiffness", "static travel", "static mount force", "shaft distance", "shaft clearance", "envelope radius",
-    "parts price", "piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle",
-    "rod length", "side-force reversal rate", "apex speed", "apex acceleration", "run-up force", "run-up travel",
-    "run-up twist", "throw clearance", "running-gear mass", "torsional frequencies", "critical speeds", "absorber heat",
+    "total stiffness", "static travel", "static mount force", "degree of irregularity", "flywheel inertia",
+    "flywheel mass", "rim stress", "arm stress", "shaft distance", "shaft clearance", "envelope radius", "parts price",
+    "piston travel", "mean piston speed", "piston speed", "piston acceleration", "rod angle", "rod length",
+    "side-force reversal rate", "apex speed", "apex acceleration", "run-up force", "run-up travel", "run-up twist",
+    "throw clearance", "running-gear mass", "torsional frequencies", "critical speeds", "absorber heat",
 ] | str
 """Quantities that may be minimised or limited; those of extensions of users are texts."""
 

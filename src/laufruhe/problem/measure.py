@@ -90,12 +90,10 @@ class Measure(MeasureQuery):
     def depends_on_gas(self) -> bool:
         """True if the gas may change the measure.
 
-        These are norms of loads with gas, numbers of a flywheel, run-ups, and numbers computed from loads.
+        These are norms of loads with gas, run-ups, and numbers computed from loads or the torque.
         """
-        if self.is_load:
-            return self.load.depends_on_gas
         channel = self.channel
-        return channel.is_flywheel or bool(channel.simulation) or (channel.is_number and channel.depends_on_loads)
+        return channel.depends_on_gas or bool(channel.simulation) or (channel.is_number and channel.depends_on_loads)
 
     @property
     def depends_on_loads(self) -> bool:

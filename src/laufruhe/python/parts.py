@@ -137,13 +137,6 @@ class EngineParts(Parts):
         """
         return self._with("load_torque", "load_torque", keys_of(locals()))
 
-    def flywheel(
-        self, *, inertia: Value | None = None, mass: Value | None = None, mean_diameter: Value | None = None,
-        rim: Table | None = None, crankshaft_inertia: Value | None = None,
-    ) -> Self:
-        """Return the engine with flywheel. Parts that turn at crank speed, without pistons and rods."""
-        return self._with("flywheel", "flywheel", keys_of(locals()))
-
     def geared_inertia(self, name: str, *, share: Value, ratio: Number | None = None) -> Self:
         """Return the engine with a geared inertia. A second crank, or a flywheel on a shaft of its own."""
         return self._with("geared_inertias", "geared_inertia", keys_of(locals()))
@@ -218,6 +211,13 @@ class EngineParts(Parts):
     ) -> Self:
         """Return the engine with an electric machine. A motor or generator whose torque follows the crank angle."""
         return self._with("electric_machines", "electric_machine", keys_of(locals()))
+
+    def flywheel(
+        self, *, inertia: Value | None = None, mass: Value | None = None, mean_diameter: Value | None = None,
+        rim: Table | None = None, crankshaft_inertia: Value | None = None,
+    ) -> Self:
+        """Return the engine with flywheel. Parts that turn at crank speed, without pistons and rods."""
+        return self._with("flywheel", "flywheel", keys_of(locals()))
 
     def measurement(
         self, *, file: str, quantity: str | None = None, unit: str | None = None,

@@ -26,10 +26,10 @@ PAGE, BOOK = "report.html", "tables.xlsx"
 KINDS = ("png", "svg")
 """Endings of picture files."""
 TABLES = (
-    "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings", "torque",
+    "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings",
     "uneven-firing", "willans", "mount-critical-speeds", "mounts", "mounting",
-    "reach", "objectives-in-order", "equal-optima", "weights", "shafts", "balance-factors", "crankshaft-torque",
-    "gas-pressure", "load-cases", "even-speeds",
+    "reach", "objectives-in-order", "equal-optima", "weights", "shafts", "balance-factors",
+    "gas-pressure", "load-cases",
 )  # fmt: skip
 """Names of the tables of a result that are CSV files; extensions add theirs."""
 MADE = ".laufruhe.json"

@@ -18,7 +18,6 @@ from laufruhe.physics.gas_facts import gas_facts
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.physics.static_cases import settled
-from laufruhe.physics.torque import torque_facts, turning_torque
 from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.channels import LoadChannel, mounting_in
@@ -46,7 +45,9 @@ def as_dict(result: Result, series: bool = False) -> Record:
     points = [_point(result, k) for k in range(len(problem.points))]
     # a single operating point is at the top level
     places = {"mounts": None} | {load.key: None for load in places_of(result)}
-    keys = ("name", "speed", "weight", "torque", "gas", *((*places, "shaking") if len(points) > 1 else ()))
+    added = [section.point_record for section in EXTENSION_SECTIONS.values()]
+    of_points = [{key: entry for fill in added for key, entry in fill(result, k).items()} for k in range(len(points))]
+    keys = ("name", "speed", "weight", "gas", *((*places, "shaking") if len(points) > 1 else ()))
     if series:
         keys += ("series",)
         points = [{**point, "series": _series(result, k)} for k, point in enumerate(points)]
@@ -82,7 +83,10 @@ def as_dict(result: Result, series: bool = False) -> Record:
             (point["shaking"] for point in points),
             key=lambda shaking: [max(shaking[load], default=0.0) for load in ("force", "moment")],
         ),
-        "points": [{key: point[key] for key in keys if key in point} for point in points],
+        "points": [
+            {key: point[key] for key in keys if key in point} | entries
+            for point, entries in zip(points, of_points, strict=True)
+        ],
         **(_on_mounts(result) if is_elastic(result) else {}),
         **{
             name: section.record(result)
@@ -131,16 +135,12 @@ def _objective(result: Result) -> Record | None:
 
 def _point(result: Result, k: int) -> Record:
     point, final = result.problem.points[k], result.final
-    turning = turning_torque(final.engine, point, result.problem.fidelity)
-    facts = torque_facts(final.engine, point, result.problem.fidelity)
     gas = gas_facts(final.engine, point, result.problem.fidelity)
     return {
         **_attributes(point, "name speed weight"),
         "mounts": [],
         **{load.key: _places(result, k, load) for load in places_of(result)},
         "shaking": _shaking(final.loads[k].wrench),
-        "torque": _attributes(facts, "mean power least=minimum largest excursion irregularity")
-        | {"turning": turning and asdict(turning)},
         **({"gas": {**asdict(gas), "recording": list(gas.recording)}} if gas else {}),
     }
 

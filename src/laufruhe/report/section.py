@@ -34,6 +34,8 @@ class Section:
         Further CSV files with numbers in full precision.
     controls
         Function that returns what moves on the page of a result, by its names in `page.html`; None for nothing.
+    point_record
+        Function of a result and the index of an operating point that returns its entries of result.json at this point.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Section:
     printed: tuple[str, ...] = ()
     number_tables: NumberTables = field(default_factory=dict)
     controls: Callable[[Result], Mapping[str, Any] | None] = lambda _: None
+    point_record: Callable[[Result, int], Mapping[str, Any]] = lambda _, __: {}
 
 
 EXTENSION_SECTIONS: Mapping[str, Section] = extended("sections", Section, ())

@@ -10,11 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array
-from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.torque import excess_torque, swing_of, torque_parts, turning_inertia
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.present.curves import (
     transmissibility_of,
@@ -28,7 +24,6 @@ from laufruhe.present.measures import (
     objective_unit,
     places_of,
     ranking_of,
-    uses_torque,
 )
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
@@ -128,38 +123,6 @@ def _orders(result: Result) -> Table:
     return Table(table.head, [row for row in table.rows if row[1] == 0.0 or any(row[2 : -len(designs)])])
 
 
-def _torque(result: Result) -> Table:
-    points, fidelity = result.problem.points, result.problem.fidelity
-    angles = result.final.engine.cycle.angle * np.arange(STEPS) / STEPS
-    columns_by_point = [
-        {f"{name}: {column}": values for name, design in result.designs.items()
-         for column, values in _torques(design.engine, point, fidelity, angles).items()}
-        for point in points
-    ]  # fmt: skip
-    # an operating point may lack gas
-    names = list(dict.fromkeys(name for columns in columns_by_point for name in columns))
-    rows = [
-        [point.name, *row]
-        for point, columns in zip(points, columns_by_point, strict=True)
-        for row in np.column_stack([np.degrees(angles), *(columns.get(name, 0.0 * angles) for name in names)]).tolist()
-    ]
-    return Table(["point", "angle [deg]", *names], rows)
-
-
-def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: Array) -> dict[str, Array]:
-    # a crank that would stop has no speed
-    parts = torque_parts(engine, point, fidelity)
-    work = excess_torque(engine, point, fidelity).integral.values(angles)
-    columns = {f"torque of {part} [N m]": torque.values(angles) for part, torque in parts.items()}
-    columns["work stored [J]"] = work - work.min()
-    swing, inertia = swing_of(engine, point, fidelity), turning_inertia(engine, fidelity)
-    if inertia is not None and swing.irregularity(inertia) <= 1.0:
-        speeds = RPM * swing.speeds(inertia)[: len(swing.work)]
-        speed_angles = engine.cycle.angle * np.arange(len(speeds)) / len(speeds)
-        columns["speed [rpm]"] = np.interp(angles, speed_angles, speeds, period=engine.cycle.angle)
-    return columns
-
-
 def _uneven_firing(result: Result) -> Table:
     unit = objective_unit(result) or "-"
     rows = [
@@ -244,7 +207,6 @@ _TABLES: NumberTables = {
     "modes": (is_elastic, lambda result: Table.from_fields(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),
     "rankings": (has_ranking, _rankings),
-    "torque": (lambda result: uses_torque(result) and has_loads(result), _torque),
     "uneven-firing": (has_ranking, _uneven_firing),
     "willans": (lambda result: result.problem.friction, _willans),
     "mount-critical-speeds": (is_elastic, _mount_criticals),

@@ -1,4 +1,4 @@
-"""Solve flywheel, crankshaft and all other decisions as separate problems.
+"""Solve decisions of kinds that stand alone, such as discs of the crankshaft, and all others as separate problems.
 
 At constant speed each measure depends on one of these problems alone. So the sum of the optima is the
 optimum, and the sum of the lower bounds is a lower bound. An objective of an order of priority may leave
@@ -42,7 +42,7 @@ def _groups_of(measure: Measure, problem: Problem) -> list[Kinds]:
 
 
 def is_separable(problem: Problem) -> bool:
-    """Return True if flywheel or crankshaft are open with other numbers, and each measure depends on one group."""
+    """Return True if numbers of kinds that stand alone are open with others, and each measure depends on one group."""
     is_divided = sum(map(bool, _groups(problem))) > 1
     return is_divided and all(len(_groups_of(measure, problem)) <= 1 for measure in problem.measures)
 
@@ -99,8 +99,6 @@ def solve_decomposed(problem: Problem, solve: Solve, ranks: Sequence[PriorityLev
             return infeasible_result(problem, evaluate_start(problem), result.conflict, result.timing)
     engine = by_group[groups[-1]].final.engine if groups[-1] in by_group else problem.engine
     for group, result in by_group.items():
-        if Kind.FLYWHEEL in group:
-            engine = replace(engine, flywheel=result.final.engine.flywheel)
         for extra in result.final.engine.extras:
             if any(kind.name == extra.name for kind in group):
                 engine = engine.with_extra(extra)

@@ -23,6 +23,8 @@ OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.val
 """Channels for which programs of mounts have formulas or a simulation."""
 OF_SIZES_ALONE = frozenset(channel for channel in CHANNELS.values() if channel.size_value is not None)
 """Channels that depend on the sizes of an engine only."""
+OF_TORQUE = frozenset(channel for channel in CHANNELS.values() if channel.depends_on_torque)
+"""Channels that depend on the torque of the crank, and on the inertia of all that turns with it."""
 
 
 def imported(address: str) -> Callable[[Problem], Result]:

@@ -14,10 +14,7 @@ from laufruhe.extension import HOMES, extended, in_order, missing_extension
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
 from laufruhe.numerics.witness import collected
-from laufruhe.problem.channels import (
-    FREQUENCIES,
-    OF_FLYWHEEL,
-)
+from laufruhe.problem.channels import FREQUENCIES
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends, open_kinds
 from laufruhe.problem.evaluation import Evaluation, objective_value, with_fine_sampling
@@ -98,13 +95,6 @@ _CORE: tuple[Method, ...] = (
         proves="the value itself",
     ),
     Method(
-        "boxes of the flywheel", {Kind.FLYWHEEL: ()}, ProofStrength.EXACT,
-        imported(f"{_HERE}.boxes.flywheel:solve_flywheel"),
-        known_channels=frozenset(OF_FLYWHEEL),
-        accepts_constant=lambda _: False,
-        proves="the optimum",
-    ),
-    Method(
         "second-order cones", {**_UNBALANCES, Kind.SHARE: _AFFINE}, ProofStrength.EXACT, _SOLVE_CONES,
         refines_fidelity=True,
         proves="the optimum",
@@ -140,7 +130,7 @@ _CORE: tuple[Method, ...] = (
         proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound",
     ),
     Method(
-        "flywheel, crankshaft and other decisions separately",
+        "independent numbers separately",
         dict.fromkeys(sorted(set(KINDS.values()) - {Kind.STAR}), _ANY), ProofStrength.RELAXED, solve_separable,
         accepts_norm=lambda _: True,
         accepts_problem=is_separable,
@@ -260,10 +250,12 @@ def refuse(problem: Problem, ranks: Sequence[PriorityLevel] = ()) -> None:
         raise ModelError(
             "fidelity.mounts and fidelity.modes depend on mounts, which are open; remove both keys from [fidelity]"
         )
-    if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
-        raise ModelError(
-            "flywheel is open, but no objective or limit depends on it; fix it, or add its inertia to the objective"
-        )
+    for kind in sorted(kind for kind in kinds if kind.is_alone):
+        if not any(depends(measure.channel, {kind}, problem) for measure in problem.measures):
+            raise ModelError(
+                f"{kind.name} is open, but no objective or limit depends on it; fix it, or add a measure of it to the "
+                "objective"
+            )
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")

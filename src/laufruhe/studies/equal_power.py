@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from laufruhe.errors import ModelError
 from laufruhe.machine.layouts import Layout
 from laufruhe.machine.scaling import scale_part
-from laufruhe.problem.decision import Decision, Kind, RotorDrive
+from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.problem import Drawing, Problem
 
 
@@ -79,11 +79,13 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
 def _scaled(drawing: Drawing, scale: EqualPowerScale) -> Drawing:
     k, m, engine = scale.length, scale.mass, drawing.engine
     load = engine.load_torque
+    extras = tuple(extra.scaled(k, m) for extra in engine.extras)
+    still = {extra.name for extra in extras if extra in engine.extras}
     engine = replace(
         engine,
         slider_cranks=tuple(scale_part(part, k, m) for part in engine.slider_cranks),
         rotors=tuple(scale_part(rotor, k, m) for rotor in engine.rotors),
-        extras=tuple(extra.scaled(k, m) for extra in engine.extras),
+        extras=extras,
         load_torque=load and replace(load, torques=tuple(torque / scale.speed for torque in load.torques)),
         mounts=tuple(scale_part(mount, k, m) for mount in engine.mounts),
     )
@@ -91,7 +93,9 @@ def _scaled(drawing: Drawing, scale: EqualPowerScale) -> Drawing:
         drawing,
         engine=engine,
         points=tuple(replace(point, speed=point.speed * scale.speed) for point in drawing.points),
-        decisions=tuple(_decision(decision, k, m) for decision in drawing.decisions),
+        decisions=tuple(
+            decision if decision.kind.name in still else _decision(decision, k, m) for decision in drawing.decisions
+        ),
     )
 
 
@@ -100,7 +104,7 @@ def _decision(decision: Decision, length: float, mass: float) -> Decision:
 
     Other numbers of the file, such as an open stroke, keep their values: the engine is built with them and then scaled.
     """
-    if decision.address_drives or decision.kind is Kind.FLYWHEEL:
+    if decision.address_drives:
         return decision
     sizes = {"": 1.0, "rad": 1.0, "m": length, "kg": mass, "kg m": mass * length}
     if decision.unit not in sizes:

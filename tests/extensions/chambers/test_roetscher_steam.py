@@ -9,9 +9,9 @@ import pytest
 
 import laufruhe
 from laufruhe.extensions.chambers.gas import Chamber, Chambers, Pump, Steam
+from laufruhe.extensions.flywheel.torque import torque_facts
 from laufruhe.machine import CRANKSHAFT, Cycle, SliderCrank
 from laufruhe.physics.shaking_loads import reciprocating_loads
-from laufruhe.physics.torque import torque_facts
 from laufruhe.problem.problem import Problem
 from one_cylinder import mean_pressure_of
 from problem_files import PROBLEMS

@@ -16,13 +16,14 @@ import moving_masses as moving
 import ready
 from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.crank_rocker.mechanism import CrankRocker
+from laufruhe.extensions.flywheel.torque import torque_facts
 from laufruhe.extensions.piston_motion.motion import piston_motion
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Shaft
 from laufruhe.machine.kinematics import piston_acceleration, piston_velocity
 from laufruhe.machine.rotor import CRANKSHAFT
 from laufruhe.machine.scaling import scale_part
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, torque_facts
+from laufruhe.physics.torque import crank_torque
 from laufruhe.prove.certificate import Proof
 from problem_files import PROBLEMS
 

@@ -17,10 +17,11 @@ from lanes import first_fast
 from laufruhe.errors import InputError
 from laufruhe.extensions.electric_torque.machine import ELECTRIC_TORQUE, ElectricMachines
 from laufruhe.extensions.electric_torque.section import SECTION
+from laufruhe.extensions.flywheel.torque import torque_facts
 from laufruhe.extensions.torsion.physics import chain_of, inertias, twist
 from laufruhe.files.reader import load_tables
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, excess_torque, torque_facts
+from laufruhe.physics.torque import crank_torque, excess_torque
 from laufruhe.plots import figure
 from laufruhe.problem.channels import CHANNELS, LoadChannel
 from laufruhe.problem.dependence import Dependence, dependence, is_affine

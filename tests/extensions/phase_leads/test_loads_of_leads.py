@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from laufruhe.extensions.flywheel.channels import IRREGULARITY
 from laufruhe.extensions.phase_leads.bounds import LeadSwing
 from laufruhe.extensions.phase_leads.model import PhaseLeadModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.norms import NORMS
-from laufruhe.problem.channels import IRREGULARITY
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, Term

@@ -22,12 +22,12 @@ from typer.testing import CliRunner, Result
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError, LaufruheError
+from laufruhe.extensions.flywheel.torque import TorqueFacts, torque_facts, torque_parts
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.files import number_tables
 from laufruhe.files.number_tables import Unit, number_table, unit_in
 from laufruhe.files.reader import load
 from laufruhe.physics.gas_facts import GasFacts, cylinder_facts, gas_facts
-from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
 from laufruhe.present.gas_figures import gas_lines
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from laufruhe import load, solve
+from laufruhe.extensions.flywheel.torque import torque_parts
 from laufruhe.extensions.twins import picture as twins
-from laufruhe.physics.torque import torque_parts
 from laufruhe.report.tables import number_tables
 from laufruhe.solvers import evaluate_only
 from laufruhe.solvers.prices import Price

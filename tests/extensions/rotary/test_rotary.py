@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.bearing_loads.machine import bearings_of
 from laufruhe.extensions.bearing_loads.physics import main_bearing_forces, pin_forces
+from laufruhe.extensions.flywheel.torque import swing_of
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.files.reader import load_tables
@@ -22,7 +23,7 @@ from laufruhe.machine.gas.charge import chamber_volume
 from laufruhe.numerics.exact_angles import cis
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, swing_of
+from laufruhe.physics.torque import crank_torque
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem

@@ -13,11 +13,11 @@ import xarray as xr
 from extensions.skip_fire.pattern_sums import PlainTorque, drawn
 from lanes import first_fast
 from laufruhe.errors import InputError
+from laufruhe.extensions.flywheel.machine import Flywheel
 from laufruhe.extensions.skip_fire.patterns import count_patterns, is_even, patterns, rotations
 from laufruhe.extensions.skip_fire.torque import FiringModel
 from laufruhe.files.cylinder_states import CylinderState
 from laufruhe.files.reader import load, load_tables, tables_of
-from laufruhe.machine import Flywheel
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.plots.picture import draw
 from laufruhe.problem.evaluation import evaluate
@@ -38,7 +38,7 @@ PEAK, WORK, SPEED = (
 
 def model_of(path: Path, cycles: int = 1, state: str = "cut", inertia: float = 0.2) -> FiringModel:
     problem = load(path)
-    engine = replace(problem.engine, flywheel=Flywheel(inertia))
+    engine = problem.engine.with_extra(Flywheel(inertia))
     problem = replace(problem, engine=engine, points=problem.points[:1])
     names, gas = tuple(part.name for part in engine.slider_cranks if part.bore != 0.0), problem.points[0].gas
     misfire, cut = (names, ()) if state == "misfire" else ((), names)
@@ -101,7 +101,7 @@ def test_fixed_patterns_are_states_of_operating_points(state: str) -> None:
     valves = {"cut_valves": "open"} if state == "open" else {}
     point = {"name": "half", "speed": "800 rpm", **names, **valves}
     problem = load_tables({**tables, "operating_points": [point]}, MISFIRE)
-    engine = replace(problem.engine, flywheel=Flywheel(0.2))
+    engine = problem.engine.with_extra(Flywheel(0.2))
     core, model = evaluate(replace(problem, engine=engine)), model_of(MISFIRE, 2, state)
     pattern = model.evaluation("1010")
     measures = [ROLL, FORCE, TRAVEL, PEAK, WORK, SPEED]

@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 import laufruhe
 from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.chambers.gas import Chamber, Chambers, Pump
+from laufruhe.extensions.flywheel.torque import torque_facts
 from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Shaft
 from laufruhe.machine.rotor import CRANKSHAFT
 from laufruhe.machine.scaling import scale_part
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, torque_facts
+from laufruhe.physics.torque import crank_torque
 
 STEPS = 512
 SPEED = 9.0

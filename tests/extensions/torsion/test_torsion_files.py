@@ -10,6 +10,7 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.flywheel.machine import Flywheel
 from laufruhe.extensions.torsion.machine import Torsion, stiffness_of
 from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.files.reader import load_tables, tables_of
@@ -116,7 +117,7 @@ def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
     discs = chain(load_tables(tables, Path("five.toml"))).turning_inertia(engine.slider_cranks)
     assert discs == pytest.approx(5 * (0.006 + 0.5 * 0.045**2) + 0.008 + 0.14, rel=1e-12)
     flywheel = {"flywheel": {"inertia": f"{1.005 * discs:.6g} kg m^2"}}
-    assert load_tables({**tables, **flywheel}, Path("five.toml")).engine.flywheel is not None
+    assert load_tables({**tables, **flywheel}, Path("five.toml")).engine.extra(Flywheel) is not None
     ring = {"name": "d", "on": "pulley", "inertia": "0.1 kg m^2", "damping": "2 N m s/rad"}
     opened = [{**disc, "inertia": {"between": ["0.1 kg m^2", "0.2 kg m^2"]}} for disc in tables["torsion"]["discs"]]
     both = {"flywheel": {"inertia": f"{discs + 0.1:.6g} kg m^2"}}

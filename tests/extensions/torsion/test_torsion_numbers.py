@@ -11,8 +11,8 @@ from scipy.optimize import brentq, differential_evolution
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.flywheel.torque import swing_of
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.physics.torque import swing_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof

@@ -14,8 +14,8 @@ EXTENSION = Extension(
     keys=(f"{_HERE}.file:KEY",),
     channels=tuple(f"{_HERE}.channels:{name}" for name in _CHANNELS),
     dependences=(
-        *(f"{name}  a a a  v m >  >  0 0  0  torsion=0 electric_machines=0" for name in _OF_BEARINGS),
-        *(f"{name}  0 0 a  0 m s  >  0 0  0  torsion=0 electric_machines=0" for name in _OF_PINS),
+        *(f"{name}  a a a  v m >  >  0 0  flywheel=0 torsion=0 electric_machines=0" for name in _OF_BEARINGS),
+        *(f"{name}  0 0 a  0 m s  >  0 0  flywheel=0 torsion=0 electric_machines=0" for name in _OF_PINS),
     ),
     sections=(f"{_HERE}.section:SECTION",),
     pictures=(f"{_HERE}.section:PICTURE",),

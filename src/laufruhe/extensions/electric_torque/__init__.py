@@ -4,13 +4,12 @@ from laufruhe.extension import Extension
 
 _HERE = "laufruhe.extensions.electric_torque"
 _AFFINE = ("roll moment", "mount force", "resultant mount force", "mount travel", "stored work")
-_SMOOTH = ("transmissibility", "degree of irregularity")
+_SMOOTH = ("transmissibility",)
 _FREE = (
     "shaking force", "rocking couple", "surging force", "swaying couple", "crank torque",
     "counterweight mass", "balancer mass", "added mass", "static sag", "natural frequencies", "motion frequencies",
     "kinetic-energy decoupling", "decoupling shortfall", "torque-roll residual", "raw torque-roll residual",
-    "total stiffness", "static travel", "static mount force", "flywheel inertia", "flywheel mass", "rim stress",
-    "arm stress",
+    "total stiffness", "static travel", "static mount force",
 )  # fmt: skip
 EXTENSION = Extension(
     "electric_torque",
@@ -18,7 +17,7 @@ EXTENSION = Extension(
     kinds=(f"{_HERE}.machine:ELECTRIC_TORQUE",),
     channels=(f"{_HERE}.channels:ELECTRIC_TORQUE",),
     dependences=(
-        "electric torque  0 0 0  0 0 0  0  0 0  0  torsion=0 electric_machines=a",
+        "electric torque  0 0 0  0 0 0  0  0 0  flywheel=0 torsion=0 electric_machines=a",
         *(
             f"{name}  electric_machines={letter}"
             for letter, names in (("a", _AFFINE), ("s", _SMOOTH), ("0", _FREE))

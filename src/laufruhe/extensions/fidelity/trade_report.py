@@ -26,7 +26,6 @@ from laufruhe.plots.style import as_svg, save
 from laufruhe.present.numbers import DASH, figure, fixed, number
 from laufruhe.present.static_load import static_sentence
 from laufruhe.present.tables import Table
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.report import files
@@ -62,7 +61,7 @@ def traded(
     """
     problems = [problem_with_objective(path) for path in paths]
     for path, problem in zip(paths, problems, strict=True):
-        if Kind.FLYWHEEL in open_kinds(problem):
+        if "flywheel" in {kind.name for kind in open_kinds(problem)}:
             rule = "is open, but fidelities are compared for a fixed flywheel only"
             raise refused("flywheel", "", rule, "fix the flywheel", path)
     trades, documents = list[Trade](), list[Document]()

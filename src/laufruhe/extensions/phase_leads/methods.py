@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from laufruhe.problem.channels import IRREGULARITY, MOUNT_FORCE, OF_BLOCK
+from laufruhe.problem.channels import MOUNT_FORCE, OF_BLOCK
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.solvers.method import Method, imported, is_no_number, is_pointwise
+from laufruhe.solvers.method import OF_TORQUE, Method, imported, is_no_number, is_pointwise
 
 _SOLVER, _NEXT = "laufruhe.extensions.phase_leads.solver", "stars, each with cones"
 
 SHIFTED_LOADS = Method(
     "boxes of leads", {Kind.UNBALANCE: (Dependence.AFFINE,), Kind.LEAD: (Dependence.SHIFT,)}, ProofStrength.EXACT,
     imported(f"{_SOLVER}:solve_leads"),
-    refines_fidelity=True, known_channels=frozenset({IRREGULARITY}), accepts_norm=is_pointwise,
+    refines_fidelity=True, known_channels=OF_TORQUE, accepts_norm=is_pointwise,
     accepts_constant=is_no_number, before=_NEXT,
     proves="the optimum, as far as the boxes go (P13)",
 )  # fmt: skip

@@ -13,8 +13,8 @@ EXTENSION = Extension(
     ),
     dependences=(
         # an open rod length may be a size
-        *(f"{name}  0 0 0  0 s 0  0  0 0  0  torsion=0 electric_machines=0" for name in _OF_SHAPE),
-        "side-force reversal rate  0 0 s  0 s s  s  0 0  0  torsion=0 electric_machines=0",
+        *(f"{name}  0 0 0  0 s 0  0  0 0  flywheel=0 torsion=0 electric_machines=0" for name in _OF_SHAPE),
+        "side-force reversal rate  0 0 s  0 s s  s  0 0  flywheel=0 torsion=0 electric_machines=0",
     ),
     sections=(f"{_HERE}.section:SECTION",),
 )

@@ -8,7 +8,7 @@ EXTENSION = Extension(
     keys=(f"{_HERE}.file:FRAME", f"{_HERE}.file:RECEIVERS"),
     channels=tuple(f"{_HERE}.channels:{name}" for name in ("ACCELERATION", "VELOCITY", "PRESSURE")),
     dependences=tuple(
-        f"receiver {quantity}  a a a  b m >  >  s s  0  torsion=0 electric_machines=a"
+        f"receiver {quantity}  a a a  b m >  >  s s  flywheel=0 torsion=0 electric_machines=a"
         for quantity in ("acceleration", "velocity", "pressure")
     ),
     sections=(f"{_HERE}.section:SECTION",),

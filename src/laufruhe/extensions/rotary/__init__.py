@@ -10,8 +10,8 @@ EXTENSION = Extension(
         "laufruhe.extensions.rotary.apexes:APEX_ACCELERATION",
     ),
     dependences=(
-        "apex speed  0 0 0  0 0 0  0  0 0  0  torsion=0",
-        "apex acceleration  0 0 0  0 0 0  0  0 0  0  torsion=0",
+        "apex speed  0 0 0  0 0 0  0  0 0  flywheel=0 torsion=0",
+        "apex acceleration  0 0 0  0 0 0  0  0 0  flywheel=0 torsion=0",
     ),
     sections=("laufruhe.extensions.rotary.chambers:SECTION",),
     pictures=("laufruhe.extensions.rotary.chambers:PICTURE",),

@@ -7,7 +7,7 @@ EXTENSION = Extension(
     "run_ups",
     channels=(f"{_HERE}.channels:FORCE", f"{_HERE}.channels:TRAVEL", f"{_HERE}.channels:TWIST"),
     dependences=tuple(
-        f"run-up {number}  s s s  s s s  s  s s  s  torsion=s" for number in ("force", "travel", "twist")
+        f"run-up {number}  s s s  s s s  s  s s  flywheel=s torsion=s" for number in ("force", "travel", "twist")
     ),
     keys=(f"{_HERE}.file:KEY",),
     reductions=(f"{_HERE}.reduction:REDUCTION",),

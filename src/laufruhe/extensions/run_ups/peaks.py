@@ -196,7 +196,7 @@ class RunPeaks:
             [direction if j == k else 0.0 for j in range(len(unbalances))] for k, direction in units
         ]
         point = point_of(run, problem.points)
-        engine_alone = replace(problem.engine, flywheel=None, extras=())
+        engine_alone = replace(problem.engine, extras=())
         designs = [
             problem.numbers(value, unbalances).engine(engine_alone) if unbalances else engine_alone for value in values
         ]

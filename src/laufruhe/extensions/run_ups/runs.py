@@ -75,7 +75,7 @@ def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run)
     ModelError
         If the engine has no elastic mounts.
     """
-    return _cached_runs(replace(engine, flywheel=None, extras=()), point, fidelity, run)
+    return _cached_runs(replace(engine, extras=()), point, fidelity, run)
 
 
 @lru_cache(maxsize=32)

@@ -33,7 +33,6 @@ STILL: Mapping[Kind, str] = {
     Kind.STIFFNESS: "these mounts",
     Kind.MOUNT: "these mounts",
     Kind.STAR: "this crank",
-    Kind.FLYWHEEL: "this flywheel",
     Kind.SIZE: "these sizes",
     Kind.LEAD: "these phases of geared shafts",
 }

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extension import object_at
 from laufruhe.extensions.sweeps.swept import SweptPart
 from laufruhe.extensions.sweeps.swept_report import (
     MAX_ROWS,
@@ -26,7 +27,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine.slider_crank import displacement
-from laufruhe.physics.torque import swing_of, torque_facts
+from laufruhe.physics.torque import crank_torque
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import number as figures
 from laufruhe.problem.evaluation import Evaluation
@@ -45,7 +46,7 @@ Quantity: TypeAlias = Callable[[Evaluation], float]
 """Function that returns a quantity of a design; its `ModelError` states why the design has no value."""
 EQUAL = "equal cylinders"
 _SAME, _NEGLIGIBLE, _FIGURES = 1e-9, 1e-7, 1e-5
-_MIN_FLYWHEEL = "least flywheel"
+_MIN_FLYWHEEL, _SWING = "least flywheel", "laufruhe.extensions.flywheel.torque:swing_of"
 _RESIZED = (
     "Resized engines. With z cylinders, all lengths of a problem file are multiplied by the root of the number of "
     "reference cylinders over z: bore, stroke, spacing, planes of weights, and positions of mounts. Masses grow with "
@@ -75,6 +76,9 @@ class LayoutComparison(SweptPart):
 
         Cylinders must have one size.
         """
+        if self.flywheel_for is not None:
+            # raise an error without the extension
+            object_at(_SWING)
         points = super().points(problem_files)
         power = self.cases[0].equal_power_to
         odd = next((case for case in self.cases if case.equal_power_to != power), None)
@@ -116,7 +120,7 @@ class LayoutComparison(SweptPart):
             n: partial(_value, m) for n, m in self._measures(problem, point.case, problem_files).items()
         }
         if self.flywheel_for is not None:
-            degree = self.flywheel_for
+            degree, swing_of = self.flywheel_for, object_at(_SWING)
             further[_MIN_FLYWHEEL] = lambda design: max(
                 swing_of(design.engine, loads.point, design.fidelity).minimum_inertia(degree) for loads in design.loads
             )
@@ -204,7 +208,11 @@ def _sizes(problem: Problem) -> dict[str, tuple[str, Quantity]]:
     """Return the sizes of a resized engine by name: unit, and function of its design."""
 
     def power(k: int) -> Quantity:
-        return lambda design: torque_facts(design.engine, design.loads[k].point, design.fidelity).power
+        def value(design: Evaluation) -> float:
+            point = design.loads[k].point
+            return point.speed * float(crank_torque(design.engine, point, design.fidelity).coefficients[0].real)
+
+        return value
 
     def speed(k: int) -> Quantity:
         return lambda design: design.loads[k].point.speed

@@ -21,12 +21,11 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.extensions.torsion.channels import ABSORBER_HEAT, FACTORS, RESONANCES
 from laufruhe.extensions.torsion.coordinates import TwistCoordinates
-from laufruhe.extensions.torsion.machine import Torsion
+from laufruhe.extensions.torsion.machine import TORSION, Torsion
 from laufruhe.extensions.torsion.physics import Resonance, dynamic_stiffness, inertias, receptances, throw_torques
-from laufruhe.machine import Flywheel
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.physics.torque import turning_inertia
-from laufruhe.problem.dependence import depends, falls_with_flywheel
+from laufruhe.problem.dependence import depends, falls_with
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
@@ -75,16 +74,16 @@ class _InertiaBound:
     """Bound of the rotating inertia, or of a degree of irregularity that falls with it (T9, V14)."""
 
     def __init__(self, measure: Measure, evaluation: Evaluation) -> None:
-        if measure.channel.flywheel_value is None:
-            raise TypeError(f"{measure.name} is not a measure of the flywheel or the torsional chain")
-        self._number = measure.channel.flywheel_value(measure, evaluation)
-        self._rises = not falls_with_flywheel(measure.channel)
+        if measure.channel.inertia_value is None:
+            raise TypeError(f"{measure.name} is no measure of the rotating inertia")
+        self._number = measure.channel.inertia_value(measure, evaluation)
+        self._rises = not falls_with(measure.channel, TORSION)
         self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
 
     def minimum(self, chains: Sequence[Torsion]) -> float:
         """Return the minimum over a box, from the chains at its lower corner, centre and upper corner."""
         inertia = turning_inertia(self._engine.with_extra(chains[0 if self._rises else -1]), self._fidelity)
-        return 0.0 if inertia is None else self._number(Flywheel(inertia))
+        return 0.0 if inertia is None else self._number(inertia)
 
 
 class TwistBoxes:
@@ -314,7 +313,7 @@ class TwistBoxes:
 
 
 def _turns(measure: Measure) -> bool:
-    return measure.channel.is_monotone_in_inertia
+    return measure.channel.inertia_value is not None
 
 
 def _is_square(measure: Measure) -> bool:

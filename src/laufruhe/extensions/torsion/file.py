@@ -19,7 +19,7 @@ from laufruhe.files.problem_file import ExtensionContext, Key
 from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.physics.torque import reduced_inertia
-from laufruhe.problem.decision import Decision, Kind, NumberDrive
+from laufruhe.problem.decision import Decision, NumberDrive
 from laufruhe.problem.problem import Problem
 
 T = TypeVar("T")
@@ -333,20 +333,20 @@ def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> P
     """Return the problem with the torsional chain of [torsion]; refuse an inertia that contradicts the discs (V14)."""
     chain, decisions = _chain(table, problem.engine.slider_cranks, context.throws)
     _check_machines(problem, chain)
-    wheel = problem.engine.flywheel
+    inertia = problem.engine.turning_inertia
     result = replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))
-    if wheel is None:
+    if inertia is None:
         return result
-    where = "fidelity.crank_inertia" if context.file.flywheel is None else "flywheel"
+    where = "fidelity.crank_inertia" if getattr(context.file, "flywheel", None) is None else "flywheel"
     discs = {(disc.name, "inertia") for disc in chain.discs}
     for decision in result.decisions:
-        if decision.kind is Kind.FLYWHEEL:
+        if decision.kind.name == "flywheel":
             rule = "is open, but the discs of [torsion] give the inertia of all rotating parts"
             raise Refused(decision.name, None, rule, "remove [flywheel], and leave the inertia of a disc open")
         if any(key in discs for key in decision.keys(TORSION)):
             rule = f"gives an inertia that follows from {decision.name}, which is open"
             raise Refused(where, None, rule, "leave it out")
-    inertia, without_rings = wheel.inertia, chain.turning_inertia(problem.engine.slider_cranks)
+    without_rings = chain.turning_inertia(problem.engine.slider_cranks)
     maximum = without_rings + sum(absorber.inertia for absorber in chain.absorbers)
     if not without_rings * (1.0 - _ROUNDED) <= inertia <= maximum * (1.0 + _ROUNDED):
         of_discs = units.quantity_text(without_rings, "kg m^2")

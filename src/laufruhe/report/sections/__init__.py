@@ -9,8 +9,7 @@ from laufruhe.solvers.result import Result
 
 SECTIONS = (
     values.attainable, stars.crank_stars, values.objectives, values.decisions, weights.weights, weights.shafts,
-    weights.factors, values.limits, loads.places, loads.gas, loads.torque, elastic.modes, elastic.load_cases,
-    loads.orders,
+    weights.factors, values.limits, loads.places, loads.gas, elastic.modes, elastic.load_cases, loads.orders,
 )  # fmt: skip
 
 

@@ -1,17 +1,14 @@
-"""Tables of loads: forces by place, amplitudes by order, and crankshaft torque."""
+"""Tables of loads: forces by place, amplitudes by order, and gas pressure."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from itertools import starmap
 
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_forces import CycleMeasures
-from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, turning_inertia, turning_torque
 from laufruhe.present.gas_figures import gas_head, gas_note, gas_rows
 from laufruhe.present.measures import (
     evaluations_with_loads,
@@ -23,11 +20,10 @@ from laufruhe.present.measures import (
     pad_orders,
     places_of,
     shaking_orders,
-    uses_torque,
 )
-from laufruhe.present.numbers import DASH, RPM, aligned, number, percent
+from laufruhe.present.numbers import DASH, aligned, number, percent
 from laufruhe.present.tables import Table
-from laufruhe.problem.channels import IRREGULARITY, LoadChannel
+from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
@@ -35,16 +31,6 @@ from laufruhe.solvers.result import Result
 from laufruhe.units import readable, usual_unit
 
 MAX_ORDERS, SHARE = 8, 0.005
-TORQUE = (
-    "Torque of gas, pistons and rods, less the friction of [friction]. Stored: energy that the flywheel must store. "
-    "Irregularity: largest less smallest speed over the mean. To turn: largest torque that turns the crank slowly, "
-    "without combustion and friction."
-)
-# channels of the flywheel that depend on the speed of the crank
-_OF_SPEED = frozenset({IRREGULARITY})
-EVEN = (
-    "Speeds at which this flywheel keeps the limit with the same torque of gas and load; the ranges are proven (T13)."
-)
 
 
 def places(result: Result) -> list[Table]:
@@ -160,52 +146,3 @@ def gas(result: Result) -> list[Table]:
     last = None if any(point.fmep for point in result.problem.points) else -2
     head, rows = gas_head()[:last], [row[:last] for row in rows]
     return [Table(head, rows, title="Gas pressure", note=note, file="gas-pressure")]
-
-
-def torque(result: Result) -> list[Table]:
-    """Return a table of crank torque by operating point, if a measure needs torque or there is a flywheel."""
-    engine, problem = result.final.engine, result.problem
-    if not uses_torque(result):
-        return []
-    rows, (unit, factor), (power_unit, _) = [], readable("N m"), readable("W", "kW")
-    for point in problem.points:
-        cells = _torque_cells(torque_facts(engine, point, problem.fidelity))
-        turning = turning_torque(engine, point, problem.fidelity)
-        rows.append((point.name, *cells, DASH if turning is None else number(factor * turning.torque)))
-    head = (
-        "at", f"mean [{unit}]", f"power [{power_unit}]", f"least [{unit}]", f"largest [{unit}]", "stored [J]",
-        "irregularity", f"to turn [{unit}]",
-    )  # fmt: skip
-    return [
-        Table(head, rows, title="Torque of the crankshaft", note=TORQUE, file="crankshaft-torque"),
-        *_even_speeds(result),
-    ]
-
-
-def _even_speeds(result: Result) -> list[Table]:
-    """Return the speeds that keep a limit on the degree of irregularity, by limit and operating point."""
-    engine, fidelity = result.final.engine, result.problem.fidelity
-    inertia = turning_inertia(engine, fidelity)
-    rows = []
-    for limit in result.problem.limits:
-        for point in result.problem.points:
-            if limit.measure.channel in _OF_SPEED and inertia is not None and limit.measure.includes_point(point):
-                ranges = swing_of(engine, point, fidelity).speed_ranges(limit.maximum, inertia)
-                rows.append((limit.name, point.name, "; ".join(starmap(_range_text, ranges)) or DASH))
-    head = ("limit", "gas and load of", "speeds [rpm]")
-    return [Table(head, rows, title="Speeds that keep the limit", note=EVEN, file="even-speeds")] if rows else []
-
-
-def _range_text(low: float, high: float) -> str:
-    if math.isinf(high):
-        return f"from {number(low * RPM, 5)}" if low else "all"
-    return f"{number(low * RPM, 5)} to {number(high * RPM, 5)}"
-
-
-def _torque_cells(facts: TorqueFacts) -> list[str]:
-    factor, of_power = readable("N m")[1], readable("W", "kW")[1]
-    size, uneven = factor * max(abs(facts.minimum), abs(facts.largest)), facts.irregularity
-    values = factor * facts.mean, of_power * facts.power, factor * facts.minimum, factor * facts.largest
-    numbers = [number(value, scale=size) for value in values]
-    even = DASH if uneven is None else "0" if not uneven else f"{number(uneven, 3)} (1/{1.0 / uneven:.4g})"
-    return [*numbers, number(facts.excursion), even]

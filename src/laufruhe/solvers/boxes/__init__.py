@@ -1,1 +1,1 @@
-"""Solve for decisions without a convex program by branch and bound: positions, phase leads, flywheel sizes."""
+"""Solve for decisions without a convex program by branch and bound: positions, phase leads, sizes."""

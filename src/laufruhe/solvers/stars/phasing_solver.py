@@ -15,6 +15,8 @@ from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.machine.firing import MAX_ORDERS
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import report_progress
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import Dependence, dependence, depends, open_kinds
 from laufruhe.problem.evaluation import evaluate, objective_value, with_more_samples
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -33,43 +35,54 @@ from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 from laufruhe.solvers.values import ObjectiveValue
 
-_EQUAL_STARS = "all even stars have the same degree of irregularity"
 
+def alike_measures(problem: Problem) -> list[Measure]:
+    """Return the measures that are numbers and equal for all even stars of equal cylinders (S35).
 
-def flywheel_measures(problem: Problem) -> list[Measure]:
-    """Return measures of the flywheel and of its degree of irregularity."""
-    return [measure for measure in problem.measures if measure.channel.is_flywheel]
+    They depend on no other open number.
+    """
+    others = open_kinds(problem) - {Kind.STAR}
+    return [
+        measure
+        for measure in problem.measures
+        if measure.channel.is_number
+        and dependence(measure.channel, Kind.STAR, problem) in (Dependence.NONE, Dependence.SWING)
+        and not depends(measure.channel, others, problem)
+    ]
 
 
 def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Problem], Result]) -> Result:
-    """Choose among even crank stars without the flywheel's measures, which are equal for all of them (S35).
+    """Choose among even crank stars without the measures that are equal for all of them (S35).
 
     All even stars of equal cylinders have the same dead centres, and so the same torque. `solve` solves the problem
-    without measures of the flywheel.
+    without these measures.
     """
+    alike = alike_measures(problem)
+    names = " and ".join(dict.fromkeys(measure.channel.name for measure in alike))
+    equal_stars = f"all even stars have the same {names}"
     initial = evaluate(problem)
-    wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]
-    violated = violated_limits(wheel, initial)
+    equal_limits = [limit for limit in problem.limits if limit.measure in alike]
+    violated = violated_limits(equal_limits, initial)
     if violated:
         reason = (
-            f"no crank star keeps {quote_names(violated)}: the degree of irregularity is equal for all even stars; "
-            "increase the flywheel's inertia"
+            f"no crank star keeps {quote_names(violated)}: the {names} is equal for all even stars; "
+            "relax the limit, or increase the inertia of all that turns"
         )
         return no_star(problem, reason, conflict=violated)
-    limits = tuple(limit for limit in problem.limits if limit not in wheel)
-    terms = tuple(term for term in problem.objective if not term.measure.channel.is_flywheel)
+    limits = tuple(limit for limit in problem.limits if limit not in equal_limits)
+    terms = tuple(term for term in problem.objective if term.measure not in alike)
     limit_terms = [Term(limit.measure) for limit in limits if not limit.measure.channel.is_number]
     if not terms and not limit_terms:
-        return _any_star(problem, phasing)
+        return _any_star(problem, phasing, equal_stars)
     # without other terms, any design within the limits is optimal
     load_terms = terms or tuple(limit_terms[:1])
 
-    def without_wheel(star_problem: Problem) -> Problem:
-        load_limits = tuple(x for x in star_problem.limits if not x.measure.channel.is_flywheel)
+    def without_alike(star_problem: Problem) -> Problem:
+        load_limits = tuple(x for x in star_problem.limits if x.measure not in alike)
         return star_problem.changed(objective=load_terms, limits=load_limits)
 
-    inner = replace(phasing, problem_of=lambda candidate: without_wheel(phasing.problem_of(candidate)))
-    result = solve(replace(without_wheel(problem), phasing=inner))
+    inner = replace(phasing, problem_of=lambda candidate: without_alike(phasing.problem_of(candidate)))
+    result = solve(replace(without_alike(problem), phasing=inner))
     result = with_constant_limits(
         replace(result, problem=result.problem.changed(objective=problem.objective)), problem.limits
     )
@@ -77,18 +90,18 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     if result.objective is None or result.certificate is None:
         return result
     # part of the objective that is equal for all stars
-    wheel_terms = [term for term in problem.objective if term.measure.channel.is_flywheel]
-    wheel_value = sum((term.weight * result.final.value(term.measure) for term in wheel_terms), 0.0)
+    equal_terms = [term for term in problem.objective if term.measure in alike]
+    equal_value = sum((term.weight * result.final.value(term.measure) for term in equal_terms), 0.0)
     value, proof = objective_value(problem, result.final), result.certificate
-    bound = wheel_value + (proof.lower_bound if terms else 0.0)
+    bound = equal_value + (proof.lower_bound if terms else 0.0)
     zero_level = numerical_zero(problem, result.final.engine)
     details = result.phasing
     if details is not None and terms:
         ranking = (
-            replace(s, value=s.value + wheel_value, lower_bound=s.lower_bound + wheel_value) for s in details.ranking
+            replace(s, value=s.value + equal_value, lower_bound=s.lower_bound + equal_value) for s in details.ranking
         )
         details = replace(details, ranking=tuple(ranking))
-    method = f"{proof.method}; {_EQUAL_STARS}"
+    method = f"{proof.method}; {equal_stars}"
     return replace(
         result,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
@@ -100,7 +113,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     )
 
 
-def _any_star(problem: Problem, phasing: Phasing) -> Result:
+def _any_star(problem: Problem, phasing: Phasing, equal_stars: str) -> Result:
     """Return the result of the first crank star, because all evenly firing crank stars have the same objective."""
     families, reason = families_of(phasing)
     if not families:
@@ -110,10 +123,10 @@ def _any_star(problem: Problem, phasing: Phasing) -> Result:
     result = solve_fixed(replace(phasing.problem_of(candidate), phasing=None))
     value = objective_value(result.problem, result.final)
     proof = make_certificate(
-        value, value, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0, _EQUAL_STARS
+        value, value, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0, equal_stars
     )
     ranking = [ranked_star(phasing, candidate, family.first, value, value, True)]
-    details = ranking_result(phasing, candidate, ranking, sum(x.size for x in families), 1, _EQUAL_STARS)
+    details = ranking_result(phasing, candidate, ranking, sum(x.size for x in families), 1, equal_stars)
     return with_star(problem, phasing, result, candidate, proof, details)
 
 
@@ -134,8 +147,8 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
     phasing = problem.phasing
     if phasing is None:
         raise SolverError("the problem has no open phasing")
-    has_wheel = bool(flywheel_measures(problem))
-    if phasing.throws is None and has_wheel and not phasing.continuous and problem.cylinders_are_alike:
+    has_alike = bool(alike_measures(problem))
+    if phasing.throws is None and has_alike and not phasing.continuous and problem.cylinders_are_alike:
         return solve_alike_stars(problem, phasing, partial(solve_phasing, search=search))
     started = time.perf_counter()
     if phasing.throws is not None:
@@ -149,15 +162,15 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
 
 def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
-    has_wheel = bool(flywheel_measures(problem))
-    if has_wheel and problem.cylinders_are_alike:
+    has_alike = bool(alike_measures(problem))
+    if has_alike and problem.cylinders_are_alike:
         even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
         solve = partial(solve_phasing, search=search)
         result = solve_alike_stars(problem, even, solve) if is_even and families_of(even)[0] else None
         return _solve_uneven(problem, phasing, None if result is None or result.objective is None else result)
     is_resolved = any(measure.is_cylinder_resolved for measure in problem.measures)
     solves_each = problem.depends_on_firing_order and (phasing.shares_throws or is_resolved)
-    if is_even and (has_wheel or solves_each):
+    if is_even and (has_alike or solves_each):
         stars = even_stars(phasing)
         result = solve_every_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
         if not phasing.continuous:

@@ -14,14 +14,16 @@ from scipy.optimize import brentq
 
 import laufruhe
 from laufruhe.extensions.fidelity.reference import Reference, reference
-from laufruhe.machine import Arms, Engine, Rim
-from laufruhe.machine.flywheel import GRAVITY
+from laufruhe.extensions.flywheel.machine import Arms, Rim
+from laufruhe.extensions.flywheel.picture import applies, figure
+from laufruhe.extensions.flywheel.torque import swing_of, torque_facts, torque_parts
+from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, swing_of, torque_facts, torque_parts
+from laufruhe.physics.torque import crank_torque
 from laufruhe.physics.uneven_speed import crank_motion
-from laufruhe.plots.results.torque import applies, figure
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import MEASURES, Measure, Term
 from one_cylinder import irregularity

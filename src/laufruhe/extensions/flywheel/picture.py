@@ -11,9 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
+from laufruhe.extensions.flywheel.section import has_curves
+from laufruhe.extensions.flywheel.torque import TorqueFacts, swing_of, torque_facts, torque_parts
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.torque import TorqueFacts, excess_torque, swing_of, torque_facts, torque_parts, turning_inertia
+from laufruhe.physics.torque import excess_torque, turning_inertia
 from laufruhe.plots.style import (
     BLUE,
     GREEN,
@@ -31,7 +33,6 @@ from laufruhe.plots.style import (
     styled,
 )
 from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
-from laufruhe.present.measures import has_loads, uses_torque
 from laufruhe.present.numbers import RPM, number
 from laufruhe.solvers.result import Result
 
@@ -42,14 +43,10 @@ COLOURS = {
     "gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK, "load": PURPLE, "weights": VERMILION, "friction": INDIGO,
     "machines": BLUE,
 }  # fmt: skip
+applies = has_curves
 # smallest drawn part, and smallest drawn order, relative to the largest
 MIN_PART, MIN_ORDER = 1e-3, 1e-2
 _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}
-
-
-def applies(result: Result) -> bool:
-    """Return True if the result shows crankshaft torque and has loads."""
-    return uses_torque(result) and has_loads(result)
 
 
 @styled()

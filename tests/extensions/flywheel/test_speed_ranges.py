@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from laufruhe.extensions.flywheel.torque import Swing, swing_of
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import LoadTorque
-from laufruhe.physics.torque import Swing, crank_torque, swing_of, turning_inertia
+from laufruhe.physics.torque import crank_torque, turning_inertia
 from problem_files import PROBLEMS
 
 SCENES: dict[str, tuple[str, dict[str, Any]]] = {

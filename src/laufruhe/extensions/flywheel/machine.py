@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar, Self
 
 from laufruhe.errors import ModelError
+from laufruhe.machine.extra import Extra
+from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.physics.modes import GRAVITY
+from laufruhe.problem.decision import Kind
 
-GRAVITY = 9.80665
+FLYWHEEL = Kind(6, "flywheel", "flywheel", is_alone=True)
 LATERAL = 0.3
 """Poisson's ratio of the rim, of steel and of cast iron nearly."""
 
@@ -92,14 +97,16 @@ class Rim:
 
 
 @dataclass(frozen=True)
-class Flywheel:
+class Flywheel(Extra):
     """Parts that turn with the crank at its speed, pistons and rods excluded.
 
-    `rest` is the inertia of all but the rim, or of all where there is none [kg m2].
+    `rest` is the inertia of all but the rim, or of all where there is none [kg m2]. The keys of its open numbers are
+    "inertia", or the names of sizes of the rim.
     """
 
     rest: float
     rim: Rim | None = None
+    name: ClassVar[str] = FLYWHEEL.name
 
     @property
     def inertia(self) -> float:
@@ -113,19 +120,18 @@ class Flywheel:
             raise ModelError("a flywheel that is given by its inertia has no mass and no stress; give its rim")
         return self.rim
 
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Decision variables: inertia of the rest, then mean diameter, width and height of a rim."""
-        return (self.rest, *((self.rim.mean_diameter, self.rim.width, self.rim.height) if self.rim else ()))
-
     def weighing(self, mass: float) -> Flywheel:
         """Return the flywheel with the rim width that gives a mass [kg]."""
         return replace(self, rim=replace(self.ring, width=self.ring.width * (mass / self.ring.mass)))
 
-    def moved(self, numbers: Any) -> Flywheel:
-        """Return the flywheel with other values of its open numbers."""
-        rest, *section = (float(number) for number in numbers)
-        if self.rim is None:
-            return Flywheel(rest)
-        diameter, width, height = section
-        return Flywheel(rest, replace(self.rim, mean_diameter=diameter, width=width, height=height))
+    def moved(self, changes: Mapping[Any, Any], __: Sequence[SliderCrank], ___: Sequence[SliderCrank]) -> Self:
+        """Return the flywheel with changes of its open numbers."""
+        if not changes:
+            return self
+        section = {key: getattr(self.rim, key) + change for key, change in changes.items() if key != "inertia"}
+        rim = self.rim and replace(self.rim, **section)
+        return replace(self, rest=self.rest + changes.get("inertia", 0.0), rim=rim)
+
+    def turning_inertia(self, _: Sequence[SliderCrank], /) -> float:
+        """Return the inertia of all rotating parts except pistons and rods [kg m2]."""
+        return self.inertia

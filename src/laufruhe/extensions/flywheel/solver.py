@@ -9,15 +9,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from laufruhe.machine import Flywheel
+from laufruhe.extensions.flywheel.channels import FlywheelChannel
+from laufruhe.extensions.flywheel.machine import FLYWHEEL, Flywheel
+from laufruhe.extensions.flywheel.monotone import Monotone, MonotoneProblem, bisect_monotone
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Numbers, apply_decisions, real_bounds
-from laufruhe.problem.dependence import falls_with_flywheel
+from laufruhe.problem.dependence import falls_with
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.boxes.monotone import Monotone, MonotoneProblem, bisect_monotone
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, smallest_conflict, witness_of
@@ -54,17 +55,18 @@ class _Coordinates:
     @classmethod
     def from_problem(cls, problem: Problem, by_mass: bool) -> _Coordinates:
         """Return the coordinates of a flywheel's open rim sizes; if `by_mass`, the rim's mass replaces its width."""
-        assert problem.engine.flywheel is not None
+        initial = problem.engine.extra(Flywheel)
+        assert initial is not None
         names = [decision.name for decision in problem.decisions]
         has_mass = by_mass and len(names) > 1 and WIDTH in names
-        return cls(problem, problem.engine.flywheel, names.index(WIDTH) if has_mass else None)
+        return cls(problem, initial, names.index(WIDTH) if has_mass else None)
 
     def wheel(self, x: Array) -> Flywheel:
         """Return the flywheel at coordinates x, shape (n,)."""
-        values = x.tolist()
-        if self.width is not None:
-            values = [*values[: self.width], self.problem.decisions[self.width].start, *values[self.width : -1]]
-        wheel = apply_decisions(Numbers(), self.problem.decisions, values).flywheel(self.initial)
+        decisions = self.problem.decisions
+        values = x if self.width is None else np.insert(x[:-1], self.width, decisions[self.width].real_start)
+        changes = apply_decisions(Numbers(), decisions, values.tolist()).changes
+        wheel = self.initial.moved({key: change for (_, key), change in changes.items()}, (), ())
         return wheel if self.width is None else wheel.weighing(float(x[-1]))
 
     def decisions(self, x: Array) -> Array:
@@ -104,9 +106,9 @@ class _Coordinates:
             )
 
         def monotone(measure: Measure) -> Monotone:
-            assert measure.channel.flywheel_value is not None
+            assert isinstance(measure.channel, FlywheelChannel)
             flywheel_value = measure.channel.flywheel_value(measure, initial)
-            sign = -1.0 if falls_with_flywheel(measure.channel) else 1.0
+            sign = -1.0 if falls_with(measure.channel, FLYWHEEL) else 1.0
             return Monotone(lambda x: flywheel_value(self.wheel(x)), np.full(len(lower), sign))
 
         return MonotoneProblem(

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from laufruhe.extensions.flywheel.torque import TurningTorque, turning_torque
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.physics.gravity import potential_energy
-from laufruhe.physics.torque import TurningTorque, turning_torque
 from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS
 

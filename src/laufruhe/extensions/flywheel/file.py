@@ -1,21 +1,20 @@
-"""[flywheel] and [[geared_inertias]] of a problem file, and the decisions about them."""
+"""[flywheel] of a problem file, and the decisions about it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Annotated, TypeAlias
+from dataclasses import replace
+from typing import Annotated
 
 from pydantic import Field
 
 from laufruhe import units
+from laufruhe.extensions.flywheel.machine import FLYWHEEL, Arms, Flywheel, Rim
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, require_one_of
-from laufruhe.files.fields import Name, Open, Table
-from laufruhe.machine import Arms, Flywheel, GearedInertia, Rim
-from laufruhe.problem.decision import Decision, Kind, NumberDrive
-
-OpenShare: TypeAlias = Annotated[float | Open, f.Number("", minimum=0.0, maximum=1.0, openable=True)]
-_ROUNDING = 1e-12
+from laufruhe.files.fields import Open, Table
+from laufruhe.files.problem_file import ExtensionContext, Key
+from laufruhe.problem.decision import Decision, NumberDrive
+from laufruhe.problem.problem import Problem
 
 
 class ArmsTable(Table):
@@ -59,10 +58,11 @@ class FlywheelTable(Table):
 _SECTION = ("mean_diameter", "width", "height")
 
 
-def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tuple[Flywheel | None, list[Decision]]:
-    """Return the flywheel with its open numbers as decisions; without [flywheel], one with fidelity.crank_inertia."""
+def _read(table: FlywheelTable | None, problem: Problem, context: ExtensionContext) -> Problem:
+    """Return the problem with its flywheel and open numbers; without [flywheel], one with fidelity.crank_inertia."""
+    crank_inertia = context.file.fidelity.crank_inertia
     if table is None:
-        return None if crank_inertia is None else Flywheel(crank_inertia), []
+        return problem if crank_inertia is None else _with_flywheel(problem, Flywheel(crank_inertia))
     table = _with_ring(table)
     require_one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")
     if table.rim is None:
@@ -70,19 +70,24 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
             rule = "needs a rim, because without one the inertia includes all rotating parts"
             raise Refused("flywheel.crankshaft_inertia", None, rule, "leave it out")
         numbers = [("inertia", "kg m^2", Open.from_value(table.inertia))]
-        wheel, first = Flywheel(numbers[0][2].start), 0
+        wheel = Flywheel(numbers[0][2].start)
     else:
         numbers = [(key, "m", Open.from_value(getattr(table.rim, key))) for key in _SECTION]
-        wheel, first = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim)), 1
+        wheel = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim))
     if crank_inertia is not None:
         rule, text = "is given by [flywheel] too", units.quantity_text(crank_inertia, "kg m^2")
         remedy = "keep one; fidelity.crank_inertia also makes the crank speed uneven"
         raise Refused("fidelity.crank_inertia", text, rule, remedy)
-    return wheel, [
+    decisions = (
         decision
-        for k, (key, unit, number) in enumerate(numbers, first)
-        for decision in number.decisions(f"flywheel.{key}", unit, NumberDrive(Kind.FLYWHEEL, k))
-    ]
+        for key, unit, number in numbers
+        for decision in number.decisions(f"flywheel.{key}", unit, NumberDrive(FLYWHEEL, key))
+    )
+    return _with_flywheel(problem, wheel, *decisions)
+
+
+def _with_flywheel(problem: Problem, wheel: Flywheel, *decisions: Decision) -> Problem:
+    return replace(problem, engine=problem.engine.with_extra(wheel), decisions=(*problem.decisions, *decisions))
 
 
 def _with_ring(table: FlywheelTable) -> FlywheelTable:
@@ -116,23 +121,7 @@ def _rim(table: RimTable) -> Rim:
     return Rim(diameter.start, width.start, height.start, table.density, table.whole, arms)
 
 
-class GearedInertiaTable(Table):
-    """A second crank, or a flywheel on a shaft of its own."""
-
-    name: Name
-    ratio: f.Ratio = f.optional("Speed over crank speed; negative runs against the crank.", -1.0)
-    share: OpenShare = f.required("Share of the inertia of all that turns, reduced to the crank.")
-
-
-def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia, ...], list[Decision]]:
-    """Return the geared inertias, and the decisions about their shares (L8)."""
-    inertias, decisions = [], list[Decision]()
-    for table in tables:
-        share = Open.from_value(table.share)
-        inertias.append(GearedInertia(table.name, table.ratio, share.start))
-        decisions += share.decisions(f"{table.name}.share", "", NumberDrive(Kind.SHARE, table.name))
-    maximum = sum(Open.from_value(table.share).upper for table in tables)
-    if maximum > 1.0 + _ROUNDING:
-        rule = f"have shares with the sum {maximum:g}, more than the whole inertia"
-        raise Refused("geared_inertias", None, rule, "give shares of the geared inertias that add up to at most 1")
-    return tuple(inertias), decisions
+KEY = Key(
+    "flywheel", FlywheelTable, _read, lambda table: [("flywheel", ("flywheel", "rim"))] if "rim" in table else (),
+    always=True,
+)  # fmt: skip

@@ -14,13 +14,13 @@ import laufruhe
 from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.fidelity.explanation import explained
 from laufruhe.extensions.fidelity.trade_report import traded
+from laufruhe.extensions.flywheel.machine import Flywheel, Rim
+from laufruhe.extensions.flywheel.solver import _Coordinates
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.machine import Flywheel, Rim
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Status
-from laufruhe.solvers.boxes.flywheel import _Coordinates
 from laufruhe.solvers.methods import refuse
 from one_cylinder import irregularity
 from problem_files import PROBLEMS, changed, loaded
@@ -147,8 +147,8 @@ def test_boxes_of_a_rim_are_of_its_mass_in_place_of_its_width(tmp_path: Path) ->
     initial = evaluate(problem)
     boxes, whole = (_Coordinates.from_problem(problem, by_mass) for by_mass in (True, False))
     with_mass, with_width = (each.monotone_problem(initial, problem.limits) for each in (boxes, whole))
-    assert problem.engine.flywheel is not None
-    rho = problem.engine.flywheel.ring.density
+    assert problem.engine.extra(Flywheel) is not None
+    rho = problem.engine.extra(Flywheel).ring.density
     names = [decision.name.removeprefix("flywheel.") for decision in problem.decisions]
     lower, upper = boxes.bounds
     ends = [np.pi * rho * np.prod(sides) for sides in (lower, upper)]
@@ -209,7 +209,7 @@ def test_the_worked_diesel_gets_its_printed_flywheel(diesel: laufruhe.solvers.Re
     """Check a 70 hp diesel, part E: 1:60, rim of 300 by 195 mm, 4850 kg of 6330 kg."""
     assert diesel.certificate is not None
     assert diesel.certificate.kind is Proof.GLOBAL
-    wheel = diesel.final.engine.flywheel
+    wheel = diesel.final.engine.extra(Flywheel)
     assert wheel is not None
     rim = wheel.ring
     assert diesel.objective.value == pytest.approx(6330.0, rel=0.06)
@@ -271,7 +271,7 @@ def test_the_inertia_of_an_uneven_speed_gives_the_degree(tmp_path: Path) -> None
     uneven = changed(SINGLE, "samples = 360", 'samples = 360\ncrank_inertia = "1 kg m^2"')
     degree = '[[constraints]]\nlimit = "degree of irregularity"\nmax = "1/10"\noperating_points = ["rated"]\n'
     problem = loaded(tmp_path, uneven + '[objective]\nminimise = "maximum shaking force"\n' + degree)
-    assert problem.engine.flywheel == Flywheel(1.0)
+    assert problem.engine.extra(Flywheel) == Flywheel(1.0)
     irregularity_value = laufruhe.solve(problem).limits[0].value
     assert irregularity_value == pytest.approx(irregularity(problem.engine, problem.points[0], 1.0, problem.fidelity))
     with pytest.raises(InputError, match="given by"):
@@ -381,7 +381,7 @@ def test_every_even_star_of_equal_cylinders_stores_the_same(tmp_path: Path) -> N
     degrees = [irregularity(problem.engine, point, 1.0, problem.fidelity) for point in problem.points]
     assert proven(problem).objective.value == pytest.approx(max(degrees), rel=1e-9)
     wheel = laufruhe.solve(loaded(tmp_path, text + INERTIA + objective))
-    assert wheel.final.engine.flywheel.inertia == pytest.approx(40.0, rel=1e-6)
+    assert wheel.final.engine.extra(Flywheel).inertia == pytest.approx(40.0, rel=1e-6)
 
 
 @pytest.mark.slow
