@@ -170,7 +170,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "reductions": {"objectives in order": "objectives_in_order"},
     "norms": {"rmq": "root_mean_quad", "worst mean": "worst_mean"},
-    "layouts": {"delta": "delta", "rotary": "rotary"},
+    "layouts": {"delta": "delta", "radial": "radial", "rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke", "crank-rocker": "crank_rocker", "rhombic": "rhombic"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes")
     | dict.fromkeys(_OF_BEARINGS, "bearing_loads")

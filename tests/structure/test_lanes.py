@@ -77,7 +77,7 @@ def test_cases_of_a_family_stay_at_equal_steps() -> None:
         ("src/laufruhe/extensions/sizes/model.py", {"sizes"}),
         ("tests/extensions/torsion/inputs/pendulum.toml", {"torsion"}),
         ("src/laufruhe/prove/certificate.py", {"sizes", "torsion"}),
-        ("src/laufruhe/machine/layouts/radial.py", set()),
+        ("src/laufruhe/machine/layouts/opposed_piston.py", set()),
         ("docs/index.rst", set()),
         ("tests/conftest.py", {"rotary", "sizes", "torsion"}),
         ("problems/tractor-four.toml", {"rotary", "sizes", "torsion"}),

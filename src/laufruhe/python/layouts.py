@@ -124,34 +124,6 @@ def opposed_piston(
     return engine_of(locals(), {"layout": "opposed-piston"})
 
 
-def radial(
-    cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
-    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
-    bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
-    rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
-    rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
-    rod_inertia_deficit: Value | None = None, firing_order: Sequence[int] | Literal["open"] | None = None,
-    firing_intervals: Values | None = None, fires_together: bool | None = None, gravity: bool | None = None,
-    single_cylinders: Sequence[Table] | None = None,
-    numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
-    rotation: Literal["clockwise", "counter-clockwise"] | None = None, knuckle_radius: Value | None = None,
-    master_cylinder: int | None = None, knuckle_angles: Values | None = None,
-    articulated_rod_length: Value | None = None, articulated_rod: Table | None = None,
-    knuckle_mass: Value | None = None, rocker_pivot_along: Value | None = None,
-    rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
-    rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
-    rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
-    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
-    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
-    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
-) -> EngineDraft:
-    """Return an engine of layout radial.
-
-    Master rod and articulated rods on one crank pin; cylinder 1 is upright, numbers follow the rotation.
-    """
-    return engine_of(locals(), {"layout": "radial"})
-
-
 def x_engine(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
     drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
@@ -227,6 +199,34 @@ def delta(
     return engine_of(locals(), {"layout": "delta"})
 
 
+def radial(
+    cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"],
+    drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
+    bore: Value | None = None, stroke: Value | None = None, rod_ratio: Value | None = None,
+    rod_length: Value | None = None, offset: Value | None = None, reciprocating_mass: Value | None = None,
+    rotating_mass: Value | None = None, rod: Table | None = None, big_end: Table | None = None,
+    rod_inertia_deficit: Value | None = None, firing_order: Sequence[int] | Literal["open"] | None = None,
+    firing_intervals: Values | None = None, fires_together: bool | None = None, gravity: bool | None = None,
+    single_cylinders: Sequence[Table] | None = None,
+    numbering: Sequence[int] | Literal["one bank after the other", "alternating"] | None = None,
+    rotation: Literal["clockwise", "counter-clockwise"] | None = None, knuckle_radius: Value | None = None,
+    master_cylinder: int | None = None, knuckle_angles: Values | None = None,
+    articulated_rod_length: Value | None = None, articulated_rod: Table | None = None,
+    knuckle_mass: Value | None = None, rocker_pivot_along: Value | None = None,
+    rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
+    rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
+    rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,
+    piston_rod: Table | None = None, displacer_mass: Value | None = None, pivot_distance: Value | None = None,
+    return_ratio: Value | None = None, lever_length: Value | None = None, lever: Table | None = None,
+    lever_weight: Value | None = None, lever_weight_radius: Value | None = None,
+) -> EngineDraft:
+    """Return an engine of layout radial.
+
+    Master rod and articulated rods on one crank pin; cylinder 1 is upright, numbers follow the rotation.
+    """
+    return engine_of(locals(), {"layout": "radial"})
+
+
 def rotary(
     cylinders: int | None = None, *, cycle: Literal["two-stroke", "four-stroke"], rotating_mass: Value | None = None,
     big_end: Table | None = None,
@@ -247,7 +247,7 @@ def rotary(
 
 def engine(
     catalogue: str, *,
-    layout: Literal["inline", "vee", "boxer", "opposed-piston", "radial", "x-engine", "parts", "delta",
+    layout: Literal["inline", "vee", "boxer", "opposed-piston", "x-engine", "parts", "delta", "radial",
         "rotary"] | None = None,
     drive: Literal["slider-crank", "scotch-yoke", "klein", "crank-rocker", "rhombic", "swinging-yoke"] | None = None,
     cycle: Literal["two-stroke", "four-stroke"] | None = None, cylinders: int | None = None, bore: Value | None = None,
@@ -266,12 +266,12 @@ def engine(
     split_pin_angle: Value | None = None, bank_stagger: Value | None = None,
     first_bank: Literal["left", "right"] | None = None, crank_distance: Value | None = None,
     crank_ratio: Literal[1, -1] | None = None, crank_lead: Value | None = None,
-    second_reciprocating_mass: Value | None = None, port_arc: Value | None = None, knuckle_radius: Value | None = None,
-    master_cylinder: int | None = None, knuckle_angles: Values | None = None,
-    articulated_rod_length: Value | None = None, articulated_rod: Table | None = None,
-    knuckle_mass: Value | None = None, reversed_crank: int | None = None, crank_leads: Values | None = None,
-    eccentricity: Value | None = None, rotor_radius: Value | None = None, rotor_width: Value | None = None,
-    rotor_mass: Value | None = None, rotor_inertia: Value | None = None, rocker_pivot_along: Value | None = None,
+    second_reciprocating_mass: Value | None = None, port_arc: Value | None = None, reversed_crank: int | None = None,
+    crank_leads: Values | None = None, knuckle_radius: Value | None = None, master_cylinder: int | None = None,
+    knuckle_angles: Values | None = None, articulated_rod_length: Value | None = None,
+    articulated_rod: Table | None = None, knuckle_mass: Value | None = None, eccentricity: Value | None = None,
+    rotor_radius: Value | None = None, rotor_width: Value | None = None, rotor_mass: Value | None = None,
+    rotor_inertia: Value | None = None, rocker_pivot_along: Value | None = None,
     rocker_pivot_across: Value | None = None, coupler_length: Value | None = None, rocker_arm: Value | None = None,
     rocker_end: Value | None = None, piston_rod_length: Value | None = None, rocker_angle: Value | None = None,
     rocker_side: Literal[1, -1] | None = None, coupler: Table | None = None, rocker: Table | None = None,

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.articulated import PinDriven
 from laufruhe.machine.bodies import Motion, Outline, bar
+from laufruhe.machine.pin_driven import PinDriven
 from laufruhe.machine.slider_crank import SliderCrank
 
 LINKS = "coupler", "rocker", "piston_rod"

@@ -18,10 +18,9 @@ from laufruhe.machine.layouts.build import (
 )
 from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
 from laufruhe.machine.layouts.places import Layout, stations
-from laufruhe.machine.layouts.radial import Radial
 
 LAYOUTS: Mapping[str, LayoutKind] = extended(
-    "layouts", LayoutKind, (Inline(), Vee(), Boxer(), OpposedPiston(), Radial(), XEngine(), Parts())
+    "layouts", LayoutKind, (Inline(), Vee(), Boxer(), OpposedPiston(), XEngine(), Parts())
 )
 
 __all__ = [

@@ -24,9 +24,9 @@ from hypothesis import strategies as st
 from laufruhe.errors import InputError
 from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings
 from laufruhe.extensions.bearing_loads.physics import crank_forces, main_bearing_forces, pin_forces, piston_pin_forces
+from laufruhe.extensions.radial.mechanism import ArticulatedCrank, Knuckle
 from laufruhe.files.reader import load
 from laufruhe.machine import Engine, OperatingPoint, Seiliger, SliderCrank
-from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.machine.scaling import scale_part
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import (

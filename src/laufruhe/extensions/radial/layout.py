@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.errors import KeyedError, ModelError, counted
-from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
+from laufruhe.extensions.radial.mechanism import ArticulatedCrank, Knuckle
 from laufruhe.machine.layouts.base import NUMBERING, LayoutInput, LayoutKey, LayoutKind, rod_of
 from laufruhe.machine.layouts.build import Throw, build
 from laufruhe.machine.layouts.places import Layout
@@ -127,3 +127,6 @@ def _hinged(inputs: LayoutInput, on_crank: Sequence[SliderCrank]) -> tuple[Slide
             )
         parts[k] = as_kind(ArticulatedCrank, articulated, knuckle=knuckle) if knuckle.radius else articulated
     return tuple(parts)
+
+
+RADIAL = Radial()
