@@ -12,7 +12,7 @@ from attack.plain_loads import number
 
 
 def drawn_linkage(rng: Generator, stroke: float) -> Table:
-    """Keys of a crank-rocker that makes a stroke with one way out and one back."""
+    """Draw the keys of a crank-rocker that makes a stroke with one way out and one back."""
     while True:
         arm, end, rod = stroke * rng.uniform(0.9, 2.0), stroke * rng.uniform(0.9, 2.0), stroke * rng.uniform(1.8, 3.5)
         coupler, side = stroke * rng.uniform(1.2, 3.0), int(rng.choice([-1, 1]))
@@ -49,7 +49,7 @@ def rocker_engine(rng: Generator, engine: Table) -> Table:
 
 
 def rhombic_engine(rng: Generator, engine: Table) -> Table:
-    """A half at every throw, or two that turn against each other."""
+    """Return an engine with one half at every throw, or two that turn against each other."""
     mass = middle(engine["reciprocating_mass"])
     displacer: Any = q(mass * rng.uniform(0.3, 1.5), "kg")
     if rng.random() < 0.25 and engine.get("throws") != "open":

@@ -35,7 +35,7 @@ INSIDE = ("main-bearing force", "crank-pin force")
 
 
 def driven(drive: str) -> Callable[[Generator], Table]:
-    """Problems of a drive: of any family that has pistons, what is inside its crankcase left out mostly."""
+    """Return a problem of a drive from any family with pistons, mostly without crankcase loads."""
 
     def made(rng: Generator) -> Table:
         while True:

@@ -165,7 +165,7 @@ def at_receivers(rng: Generator) -> Table:
 
 
 def motions(rng: Generator) -> Table:
-    """Sizes of slider-cranks or weights of any drive, under limits on the motion of pistons or with one minimised."""
+    """Return sizes of slider-cranks or weights of a drive, with the motion of pistons limited or minimised."""
     sized = rng.random() < 0.6
     family = "inline" if sized else str(rng.choice(["inline", "vee", "opposed-piston", "parts", "yokes", "stars"]))
     table = copy.deepcopy(families.FAMILIES[family](rng))

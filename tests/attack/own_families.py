@@ -67,7 +67,7 @@ def scene(rng: Generator, most_points: int, plain: bool, drive: str = "") -> Tab
 
 
 def without_gas(engine: Table) -> Table:
-    """An engine of a drive, all given."""
+    """Return an engine without bore, with its displacer mass at the start."""
     rest = {key: value for key, value in engine.items() if key != "bore"}
     displacer = engine.get("displacer_mass")
     return {**rest, "displacer_mass": displacer["start"]} if isinstance(displacer, dict) else rest
@@ -293,7 +293,7 @@ def run_ups(rng: Generator, drive: str = "") -> Table:
 
 
 def driven(made: Callable[[Generator, str], Table]) -> Callable[[Generator], Table]:
-    """The same of engines whose pistons a linkage drives."""
+    """Return the same problem with pistons that a linkage drives."""
     return lambda rng: made(rng, str(rng.choice(list(DRIVES))))
 
 

@@ -44,7 +44,7 @@ class Linkage:
 
 
 def rocker_pins(k: Linkage, crank: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pin of the coupler and pin of the rod on the rocker, of a crank pin at `crank`; NaN where nothing reaches."""
+    """Return the pins of coupler and rod on the rocker for a crank pin at `crank`; NaN out of reach."""
     line = k.pivot - crank
     distance = np.abs(line)
     along = (distance**2 + k.coupler**2 - k.arm**2) / (2.0 * distance)
@@ -54,13 +54,13 @@ def rocker_pins(k: Linkage, crank: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rocker_travel(k: Linkage, crank: np.ndarray) -> np.ndarray:
-    """Place of the piston along its cylinder."""
+    """Return the place of the piston along its cylinder."""
     _, end = rocker_pins(k, crank)
     return end.real + np.sqrt(k.rod**2 - (end.imag - k.offset) ** 2)
 
 
 def rocker_masses(k: Linkage, crank: np.ndarray, piston_mass: float) -> tuple[Masses, Masses]:
-    """Masses with their places, and inertias with the angles of their bodies."""
+    """Return the masses with their places, and the inertias with the angles of their bodies."""
     pin, end = rocker_pins(k, crank)
     piston = rocker_travel(k, crank) + 1j * k.offset
     ends = ((crank, pin), (k.pivot + 0.0 * end, end), (end, piston))
@@ -71,7 +71,7 @@ def rocker_masses(k: Linkage, crank: np.ndarray, piston_mass: float) -> tuple[Ma
 
 @lru_cache(maxsize=512)
 def rocker_radius(k: Linkage, stroke: float) -> float:
-    """Crank radius that moves the piston by the stroke; NaN if none does."""
+    """Return the crank radius that moves the piston by the stroke; NaN if none does."""
     high = min(k.coupler + k.arm - abs(k.pivot), abs(k.pivot) - abs(k.coupler - k.arm), k.coupler) * (1.0 - 1e-9)
 
     def excess(radius: float) -> float:
@@ -88,7 +88,7 @@ def rocker_radius(k: Linkage, stroke: float) -> float:
 
 @lru_cache(maxsize=512)
 def rocker_dead_centres(k: Linkage, radius: float) -> tuple[float, float, float] | None:
-    """Crank angles of the highest place and of the lowest after it, and the stroke; None if there are others."""
+    """Return crank angles of the highest and next lowest place, and the stroke; None if there are others."""
     alpha = 2.0 * math.pi * np.arange(DRAWN) / DRAWN
 
     def place(angle: Any) -> Any:
@@ -112,7 +112,7 @@ def _peak(height: Callable[[float], Any], near: float) -> float:
 
 
 def linkage(number: Callable[[Any], float], entry: dict[str, Any]) -> Linkage:
-    """The linkage of [engine]."""
+    """Return the linkage of [engine]."""
     lengths = ("coupler_length", "rocker_end", "piston_rod_length")
     coupler, end, rod = (number(entry[key]) for key in lengths)
     bodies = []
@@ -131,7 +131,7 @@ def linkage(number: Callable[[Any], float], entry: dict[str, Any]) -> Linkage:
 def rhombic_masses(
     crank: np.ndarray, rod: float, offset: float, masses: tuple[float, float], deficit: float
 ) -> tuple[Masses, Masses]:
-    """Piston and displacer at the ends of two rods, and the angles of both rods."""
+    """Return piston and displacer at the ends of two rods, and the angles of both rods."""
     aside = crank.imag - offset
     reach, lean = np.sqrt(rod**2 - aside**2), np.arcsin(aside / rod)
     places = [crank.real + sign * reach + 1j * offset for sign in (1.0, -1.0)]

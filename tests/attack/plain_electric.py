@@ -50,7 +50,7 @@ def limits(table: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def torque(scene: Any, machine: dict[str, Any], point: dict[str, Any]) -> np.ndarray:
-    """Torque of a machine over the cycle at an operating point [N m]."""
+    """Return the torque of a machine over the cycle at an operating point [N m]."""
     total = np.full(SAMPLES, number(machine.get("mean_torque", 0.0)))
     rows = [
         (row["order"], number(row["torque"]) * np.exp(1j * math.radians(row.get("angle", 0.0))))
@@ -72,7 +72,7 @@ def ratio_of(table: dict[str, Any], machine: dict[str, Any]) -> float:
 
 
 def on_crank_and_block(scene: Any, point: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Torque that drives the crank, and roll moment on the block, of all machines."""
+    """Return the torque on the crank, and the roll moment on the block, of all machines."""
     crank, block = np.zeros(SAMPLES), np.zeros(SAMPLES)
     for machine in scene.table.get("electric_machines", []):
         of_machine, ratio = torque(scene, machine, point), ratio_of(scene.table, machine)

@@ -159,7 +159,7 @@ def mechanism_load(m: Mechanism, turns: int) -> np.ndarray:
 
 
 def moving(m: Mechanism, base: np.ndarray) -> tuple[Weights, Weights]:
-    """Masses with their places but that of the pin at `base`, and inertias with the angles of their bodies."""
+    """Return masses with their places without the pin at `base`, and inertias with the angles of their bodies."""
     axis = np.exp(1j * m.bank)
     if m.shape is not None:
         # it turns evenly about its centre
@@ -181,13 +181,13 @@ def moving(m: Mechanism, base: np.ndarray) -> tuple[Weights, Weights]:
 
 
 def turning(angle: np.ndarray, turns: int) -> np.ndarray:
-    """Rate of an angle that may gain whole turns over the cycle."""
+    """Return the rate of an angle that may gain whole turns over the cycle."""
     gained = round((2.0 * angle[-1] - angle[-2] - angle[0]) / (2.0 * np.pi)) / turns
     return slope(angle - gained * angles(turns, len(angle)), turns).real + gained
 
 
 def energy_of(m: Mechanism, turns: int) -> np.ndarray:
-    """Kinetic energy at unit speed, without what turns with the pin."""
+    """Return the kinetic energy at unit speed, without parts that turn with the pin."""
     masses, swings = moving(m, rod_end(m, angles(turns)))
     energy = np.sum([0.5 * mass * np.abs(slope(place, turns)) ** 2 for mass, place in masses], axis=0)
     return energy + sum(0.5 * inertia * turning(angle, turns) ** 2 for inertia, angle in swings if inertia)
@@ -229,7 +229,7 @@ def travel(m: Mechanism, alpha: np.ndarray) -> np.ndarray:
 
 
 def top_and_bottom(m: Mechanism) -> tuple[float, float]:
-    """Own crank angles of the highest place of the piston, and of the lowest after it."""
+    """Return own crank angles of the highest place of the piston, and of the lowest after it."""
     if m.linkage is not None:
         centres = plain_drives.rocker_dead_centres(m.linkage, m.radius)
         assert centres is not None
@@ -240,7 +240,7 @@ def top_and_bottom(m: Mechanism) -> tuple[float, float]:
 
 
 def strokes_of(m: Mechanism, turns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Part of the stroke from the highest place, and strokes since firing, on a fine grid from own crank angle 0."""
+    """Return the share of stroke from the top, and strokes since firing, on a fine grid of own crank angles."""
     phi, (top, bottom) = angles(turns, FINE), top_and_bottom(m)
     s = travel(m, m.ratio * phi)
     highest, lowest = travel(m, np.array([top, bottom]))
@@ -253,7 +253,7 @@ def strokes_of(m: Mechanism, turns: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def seiliger(gas: dict[str, Any], m: Mechanism, turns: int) -> np.ndarray:
-    """Absolute pressure on a fine grid of one cycle from own crank angle 0; the cut-off is found by trying."""
+    """Return the absolute pressure on a fine grid of one cycle from own crank angle 0, cut-off by search."""
     return mixed_cycle(gas, *strokes_of(m, turns), 2 * turns)
 
 

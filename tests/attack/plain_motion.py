@@ -17,14 +17,14 @@ QUANTITIES = {
 
 
 def peak(values: np.ndarray) -> float:
-    """Largest value of a periodic signal, by a parabola through three samples."""
+    """Return the largest value of a periodic signal, by a parabola through three samples."""
     k = int(np.argmax(values))
     a, b, c = (float(values[(k + j) % len(values)]) for j in (-1, 0, 1))
     return b + (a - c) ** 2 / (8.0 * (2.0 * b - a - c)) if 2.0 * b > a + c else b
 
 
 def of_piston(m: Mechanism, channel: str, speed: float, turns: int) -> float:
-    """A number of one piston."""
+    """Return a number of one piston."""
     if m.lever is not None:
         turned = m.radius * np.exp(1j * angles(1))
         along = np.unwrap(np.angle(turned + 1j * m.lever.pivot))
@@ -50,7 +50,7 @@ def of_piston(m: Mechanism, channel: str, speed: float, turns: int) -> float:
 
 
 def _reversal(m: Mechanism, speed: float, turns: int) -> float:
-    """Largest rate of the side force where it changes its sign, of a rod without gas."""
+    """Return the largest rate of the side force where it changes its sign, of a rod without gas."""
     wall = plain_crankcase.side_force(m, turns, speed)
     rate = speed * slope(wall.astype(complex), turns).real
     follows, after = np.roll(wall, -1), np.roll(rate, -1)

@@ -19,7 +19,7 @@ FILTERS = {
 
 
 def weight(name: str, f: np.ndarray) -> np.ndarray:
-    """Factor of a weighting at frequencies over zero."""
+    """Return the factor of a weighting at frequencies above zero."""
     if name == "none":
         return np.ones(len(f), complex)
     f1, f2, f3, f4, q4, step = FILTERS[name]
@@ -33,7 +33,7 @@ def weight(name: str, f: np.ndarray) -> np.ndarray:
 
 
 def on_frame(block: Elastic, mounts: dict[str, Any], frame: dict[str, Any], w: np.ndarray, load: np.ndarray) -> Any:
-    """Motion of engine and frame about their centres, and the frame's centre."""
+    """Return the motion of engine and frame about their centres, and the frame's centre."""
     centre = np.array([number(v) for v in frame.get("centre_of_gravity", [0, 0, 0])])
     mass = np.zeros((12, 12))
     mass[:6, :6], mass[6:9, 6:9] = block.mass, number(frame["mass"]) * np.eye(3)
@@ -61,7 +61,7 @@ def on_frame(block: Elastic, mounts: dict[str, Any], frame: dict[str, Any], w: n
 def responses(
     table: dict[str, Any], block: Elastic, channel: str, orders: np.ndarray, wrench: np.ndarray, speed: float
 ):
-    """Coefficients (n, receivers, 3) of what is felt in orders; a steady load moves nothing."""
+    """Return response coefficients (n, receivers, 3) in orders; a steady load moves nothing."""
     unit, derivative = QUANTITIES[channel]
     w, about = orders * speed, wrench.copy()
     about[:, 3:] -= np.cross(block.centre, wrench[:, :3])

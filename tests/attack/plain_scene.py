@@ -239,7 +239,7 @@ class Scene:
         return signal
 
     def values_at_points(self, term: Table) -> np.ndarray:
-        """Its value at every operating point that counts."""
+        """Return the value at every operating point that counts."""
         norm, _ = norm_and_channel(term["quantity"])
         return np.array([norm_at(norm, one) for one in self.signal(term)[self.weights(term) > 0.0]])
 

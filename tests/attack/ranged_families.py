@@ -37,7 +37,7 @@ QUICK: Table = {"search": {"boxes": 10, "starts": 2}, "fidelity": {"samples": 24
 
 
 def on_springs(rng: Generator) -> Table:
-    """Weights on mounts that hardly damp."""
+    """Return weights on mounts with little damping."""
     table = families.balance_on_elastic(rng)
     table["mounts"]["loss_factor"] = float(rng.choice([0.01, 0.03, 0.1]))
     return table
@@ -95,7 +95,7 @@ def with_ranges(rng: Generator, table: Table) -> Table:
 
 
 def limit_over(rng: Generator, table: Table, span: Table) -> Table:
-    """A curve of one to three values about those of a random design, or those of the one as given."""
+    """Return a curve of one to three values about those of a random or of the initial design."""
     elastic = table["mounts"].get("kind") == "elastic"
     channels = ["mount force", "mount travel"] if elastic else ["mount force", "shaking force", "roll moment"]
     quantity = f"{rng.choice(['mean', 'rms', 'maximum', 'peak to peak'])} {rng.choice(channels)}"
@@ -143,7 +143,7 @@ def entry_of(table: Table, span: Table) -> Table:
 
 
 def own_points(table: Table, entry: Table) -> Table:
-    """A measure of all points counts none of the ranges."""
+    """Return the measure with all operating points named, so that no speed range counts."""
     name = entry.get("quantity", entry.get("limit", entry.get("minimise")))
     if "operating_points" in entry or not norm_and_channel(name)[0]:
         return entry
@@ -151,7 +151,7 @@ def own_points(table: Table, entry: Table) -> Table:
 
 
 def at_speeds(table: Table, ranges: list[Table], speeds: dict[str, np.ndarray], give: float = 0.0) -> Table:
-    """The problem with its ranges at some speeds [rad/s]; limits are lowered by a share."""
+    """Return the problem with its ranges at some speeds [rad/s], with limits lowered by a share."""
     points = {point["name"]: point for point in table["operating_points"]}
     out = {key: value for key, value in table.items() if key != "speed_ranges"}
     out["operating_points"], limits = list(points.values()), [own_points(table, c) for c in out.get("constraints", [])]
@@ -230,7 +230,7 @@ def _refined(height: Callable[[float], float], at: np.ndarray, k: int) -> float:
 
 
 def over_speed(table: Table, span: Table, vector: np.ndarray, star: Table) -> Callable[[np.ndarray], np.ndarray]:
-    """A function of speeds: what a design has at each."""
+    """Return a function of speeds with the value of a design at each."""
     plain = {key: value for key, value in table.items() if key != "constraints"}
 
     def value(speeds: np.ndarray) -> np.ndarray:
@@ -263,7 +263,7 @@ def rival_over(table: Table, speeds: dict[str, np.ndarray], start: np.ndarray, s
 
 
 def judge(verdict: Any, table: Table, result: Any, rng: Generator, maximum: int, reading: float) -> None:
-    """Complaints about a result with speed ranges."""
+    """Add complaints about a result with speed ranges."""
     base = Openings(at_speeds(table, [], {}))
     verdict.status = result.status.value
     if verdict.status == "failed":

@@ -37,7 +37,7 @@ LONGEST = 6
 
 
 def drawn(rng: Generator) -> tuple[Table, Table]:
-    """Problem of an engine with gas, and a part of a study of its patterns."""
+    """Return a problem of an engine with gas, and a part of a study of its patterns."""
     engine = {key: value for key, value in gas_engine(rng).items() if key != "offset" or rng.random() < 0.5}
     table: Table = {"title": "one", "engine": engine, "operating_points": points(rng, 1, 60.0, 250.0)}
     table["gas"] = {
@@ -136,7 +136,7 @@ class Patterns:
 
 
 def judge(table: Table, part: Table, folder: Path) -> list[str]:
-    """Complaints about a study of firing patterns."""
+    """Return complaints about a study of firing patterns."""
     import laufruhe
 
     patterns = Patterns(table, part["skipped"])

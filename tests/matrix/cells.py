@@ -138,7 +138,7 @@ def _crank_rocker(rng: Generator) -> Document:
 
 
 def _rhombic(rng: Generator) -> Document:
-    """Both cranks of one drive."""
+    """Return both cranks of one drive."""
     shafts = [{"name": "R", "ratio": -1, "position": ["110 mm", "0 mm"]}]
     cranks = [{"x": "20 mm", "offset": "40 mm"}, {"x": "20 mm", "offset": "-40 mm", "shaft": "R", "throw": 0}]
     keys = {"drive": "rhombic", "displacer_mass": f"{rng.uniform(0.3, 1.0):.4g} kg", "fires_together": True}

@@ -78,7 +78,7 @@ def evaluate_design(cell: Any, folder: Path) -> Verdict:
 
 
 def _at_speeds(problem: Problem, result: Result) -> Problem:
-    """The problem with its ranges of speed at many speeds, the peaks of the design decided among them."""
+    """Return the problem with its speed ranges at many speeds, the peaks of the design among them."""
     extra = problem.extra(SpeedRanges)
     if extra is None:
         return problem
