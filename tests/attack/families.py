@@ -974,7 +974,13 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
     from attack.rivals import convex_rival, stars_of
 
     openings = Openings(table)
-    if openings.numbers or "constraints" in table or "speed_ranges" in table or rng.random() > share:
+    if (
+        isinstance(table["objective"], list)
+        or "speed_ranges" in table
+        or openings.numbers
+        or "constraints" in table
+        or rng.random() > share
+    ):
         return table
     star = next(iter(stars_of(openings)), None)
     if star is None:

@@ -44,6 +44,7 @@ _OF_PISTONS = (
 # keys that a slider-crank of a free list takes from [engine] by default
 _INHERITED = {"stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_deficit"}
 _OPPOSED = "second crankshaft"
+_OF_ROD = ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit")
 _OF_ORDER = ("throws", "firing_order", "firing_intervals")
 _SAME_RADIUS = 1e-9
 _SECOND, _RECIPROCATING = "second_reciprocating_mass", "reciprocating_mass"
@@ -262,8 +263,7 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     if kind.needs_rod and not drive.has_rod:
         remedy = "leave it out, or take another layout"
         raise Refused("engine.drive", table.drive, "has no rod, and this layout needs a master rod", remedy)
-    if not drive.has_rod:
-        refuse_keys(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
+    _refuse_rod(table, table, "engine")
     bores = [part.bore for part in table.slider_cranks] or [None]
     if gas and kind.has_pistons and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, but gas pressure acts on the piston", "add it")
@@ -284,6 +284,13 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
                 rule = f"gives {parts[crank.cylinders[0]].name} and {parts[k].name} two crank radii on one throw"
                 raise Refused("engine.single_cylinders", None, rule, "give both the same stroke and offset")
     return _sharing_chambers(table, parts, gas), cranks
+
+
+def _refuse_rod(table: EngineTable, row: f.TableModel, where: str) -> None:
+    # keys of a connecting rod, of [engine] or a row of it, if the drive has none
+    if not DRIVES[table.drive].has_rod:
+        keys = [key for key in _OF_ROD if key in type(row).model_fields]
+        refuse_keys(row, keys, where, f"means nothing with drive '{table.drive}'", "leave it out")
 
 
 def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: bool) -> tuple[SliderCrank, ...]:
@@ -359,6 +366,10 @@ def _single_inputs(table: EngineTable, count: int, gas: bool) -> dict[int, Layou
             if key not in table.kind.single:
                 rule, remedy = f"cannot be that of a single cylinder in layout '{table.layout}'", "leave it out"
                 raise Refused(f"{where}.{key}", None, rule, remedy)
+        _refuse_rod(table, row, where)
+        if "offset" in keys and not DRIVES[table.drive].has_rod:
+            rule = f"cannot be that of a single cylinder with drive '{table.drive}'"
+            raise Refused(f"{where}.offset", None, rule, "leave it out")
         for number in row.cylinders:
             if number > count or number - 1 in inputs:
                 rule = f"is not among {counted(count, 'cylinder')}" if number > count else "is given twice"
@@ -505,6 +516,7 @@ def _free_parts(table: EngineTable) -> tuple[tuple[SliderCrank, ...], list[float
         if part.shaft not in shafts:
             rule = "is not the name of a shaft of this engine"
             raise Refused(f"{where}.shaft", part.shaft, rule, nearest(part.shaft, list(shafts)))
+        _refuse_rod(table, part, where)
         overrides = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
         if part.rod_ratio is not None or part.rod_length is not None:
             overrides |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}

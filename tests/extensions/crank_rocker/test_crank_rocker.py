@@ -30,6 +30,7 @@ from problem_files import PROBLEMS
 SPEED = 9.0
 PROBLEM = PROBLEMS / "beam-engine.toml"
 AT = OperatingPoint("run", SPEED)
+SHARED = {"layout", "cycle", "stroke", "reciprocating_mass", "throws", "cylinder_spacing", "single_cylinders"}
 
 
 def rocker(
@@ -192,6 +193,27 @@ def test_the_ready_problem_has_its_stroke_and_a_proof() -> None:
 def test_complaints(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
         laufruhe.load(file(**changes))
+
+
+@pytest.mark.parametrize("drive", ["crank-rocker", "swinging-yoke"])
+@pytest.mark.parametrize("key", ["rod_length", "rod_inertia_deficit", "offset"])
+def test_no_cylinder_has_a_rod_of_its_own(drive: str, key: str) -> None:
+    tables = file(layout="inline", throws=[0, 180], cylinder_spacing="1 m", single_cylinders=[{"cylinders": 2}])
+    del tables["engine"]["slider_cranks"]
+    if drive == "swinging-yoke":
+        rest = {key: value for key, value in tables["engine"].items() if key in SHARED}
+        tables["engine"] = {**rest, "drive": drive, "pivot_distance": "500 mm", "return_ratio": 1.5}
+    assert len(laufruhe.load(tables).engine.slider_cranks) == 2
+    tables["engine"]["single_cylinders"][0][key] = "1 kg m^2" if key == "rod_inertia_deficit" else "2 m"
+    with pytest.raises(InputError, match=f"single_cylinders.1..{key}: .* with drive '{drive}'"):
+        laufruhe.load(tables)
+
+
+def test_no_crank_of_a_free_list_has_a_rod_of_its_own() -> None:
+    tables = file()
+    tables["engine"]["slider_cranks"][0]["rod_inertia_deficit"] = "1 kg m^2"
+    with pytest.raises(InputError, match="rod_inertia_deficit.*means nothing with drive"):
+        laufruhe.load(tables)
 
 
 def test_a_missing_length_is_named() -> None:
