@@ -324,7 +324,7 @@ def judge_robust(verdict: Any, table: Table, result: Any, maximum: int) -> None:
 
 def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
     """Check each rank under the limits and the values that earlier ranks leave it."""
-    limits = list(table["constraints"])
+    limits = list(table.get("constraints", []))
     openings = Openings({**table, "objective": table["objective"][0]})
     vector, _ = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
     reading = 3e-5 + result.error_estimate

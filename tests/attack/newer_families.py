@@ -207,8 +207,9 @@ def motions(rng: Generator) -> Table:
         if has <= 0.0 or not math.isfinite(has):
             continue
         unit, share = plain_motion.QUANTITIES[name], rng.uniform(0.995, 1.08)
-        side, gives = ("min", 2.0 - share) if name in ("piston travel", "rod length") and rng.random() < 0.5 else (
-            "max", share)  # fmt: skip
+        # planes of a convex program are those of largest values
+        is_least = sized and name in ("piston travel", "rod length") and rng.random() < 0.5
+        side, gives = ("min", 2.0 - share) if is_least else ("max", share)
         value = (min if side == "min" else max)(plain_motion.numbers(*_of(scene if sized else at_start, entry)))
         rest = {key: part for key, part in entry.items() if key != "quantity"}
         rows.append({"limit": name, side: q(value * gives, unit, 9), "name": f"m{len(rows)}", **rest})
