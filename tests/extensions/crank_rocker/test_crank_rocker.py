@@ -205,14 +205,14 @@ def test_no_cylinder_has_a_rod_of_its_own(drive: str, key: str) -> None:
         tables["engine"] = {**rest, "drive": drive, "pivot_distance": "500 mm", "return_ratio": 1.5}
     assert len(laufruhe.load(tables).engine.slider_cranks) == 2
     tables["engine"]["single_cylinders"][0][key] = "1 kg m^2" if key == "rod_inertia_deficit" else "2 m"
-    with pytest.raises(InputError, match=f"single_cylinders.1..{key}: .* with drive '{drive}'"):
+    with pytest.raises(InputError, match=rf"single_cylinders.1..{key}: .* with drive '{drive}'"):
         laufruhe.load(tables)
 
 
 def test_no_crank_of_a_free_list_has_a_rod_of_its_own() -> None:
     tables = file()
     tables["engine"]["slider_cranks"][0]["rod_inertia_deficit"] = "1 kg m^2"
-    with pytest.raises(InputError, match="rod_inertia_deficit.*means nothing with drive"):
+    with pytest.raises(InputError, match=r"rod_inertia_deficit.*means nothing with drive"):
         laufruhe.load(tables)
 
 
