@@ -355,7 +355,7 @@ def test_evaluate_and_check_need_no_solver(tmp_path: Path) -> None:
 
 
 def test_check_answers_in_json_and_makes_no_folder(here: Path) -> None:
-    """`check --json -` prints the design as given, pure JSON, and leaves nothing behind."""
+    """Check that `check --json -` prints the initial design as pure JSON and writes no file."""
     answer = run("check", scenes.READY, "--json", "-")
     assert answer.exit_code == 0
     assert json.loads(answer.stdout)["status"] == "feasible"

@@ -86,7 +86,7 @@ def test_motion_solves_the_differential_equation() -> None:
 
 
 def test_mean_speed_and_momentum() -> None:
-    """The mean over time is the speed asked for, and no net force remains over a cycle."""
+    """Check that the mean over time is the given speed, and that no net force remains over a cycle."""
     engine, fidelity = _engine(), Fidelity(samples=720, crank_inertia=0.3)
     motion = crank_motion(engine, POINT, fidelity)
     assert motion.speed.mean() == pytest.approx(POINT.speed, rel=1e-6)

@@ -102,7 +102,7 @@ def test_open_positions_move_along_the_axes_of_the_file() -> None:
 
 
 def test_a_usual_stiffness_across_the_crank_stays_there() -> None:
-    """A rigid mount without numbers carries nothing along the crank, whatever the axes."""
+    """Check that a rigid mount without numbers carries no load along the crank, in any axes."""
     tables = {**ENGINE, "mounts": {"positions": [["0 m", "0.3 m", "0 m"], ["0 m", "-0.3 m", "0 m"]],
                                    "axes": {"crank": "-y", "up": "+z"}}}  # fmt: skip
     for mount in load(tables).engine.mounts:

@@ -31,7 +31,7 @@ def test_there_are_at_least_thirty() -> None:
 
 @pytest.mark.parametrize("key", engines())
 def test_bore_and_stroke_make_the_published_displacement(key: str, tmp_path: Path) -> None:
-    """Bore, stroke and number of cylinders come from the source; so does the displacement, told on its own."""
+    """Compare bore, stroke and cylinders with the displacement, which the source states too."""
     result = engines()[key]
     parts = _problem(tmp_path, key).engine.slider_cranks
     volume = sum(0.25 * math.pi * (part.bore or 0.0) ** 2 * part.stroke for part in parts)

@@ -93,7 +93,7 @@ def test_a_file_that_is_no_torque_is_refused_in_one_line(
 
 @pytest.mark.parametrize("turned", [45.0, 300.0])
 def test_the_coupling_counts_from_the_dead_centre_of_cylinder_1(turned: float) -> None:
-    """Throws that are turned alike turn where phi is zero, and nothing else."""
+    """Check that throws turned alike only move the zero of phi."""
     engine = {key: value for key, value in SET["engine"].items() if key != "firing_order"}
     problems = [
         load_tables({**SET, "engine": engine | {"throws": throws}}, PROBLEMS / "compressor-set.toml")

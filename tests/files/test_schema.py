@@ -49,13 +49,13 @@ def validator() -> jsonschema.Draft7Validator:
 
 
 def test_shipped_schema_is_the_generated_one() -> None:
-    """The file in the package says what the models say."""
+    """Compare the file in the package with the schema of the models."""
     assert schema_file()[1] == schema()
 
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)
 def test_ready_problems_validate(path: Path, validator: jsonschema.Draft7Validator) -> None:
-    """Editors find nothing wrong with what the reader takes."""
+    """Check that the schema accepts all files that the reader accepts."""
     validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))
     assert load(path).name == path.stem
 

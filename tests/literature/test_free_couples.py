@@ -168,7 +168,7 @@ def test_couples_of_inline_engines_lie_in_one_plane(row: Row) -> None:
     ids=lambda v: getattr(v, "name", ""),
 )
 def test_cancelled_couples_are_exactly_zero(row: Row, orders: tuple[int, ...]) -> None:
-    """A crankshaft with mirror symmetry has none; the two-stroke six none of odd orders, the V8 none of 2, 6, 10."""
+    """Check mirrored crankshafts, odd orders of the two-stroke six, and orders 2, 6, 10 of the V8."""
     for order in orders:
         assert (_loads(row, order, offset=0.012 if row is INLINE[2] else 0.0)[4:] == 0.0).all(), f"order {order}"
 
@@ -271,7 +271,7 @@ def test_couples_of_odd_engines_follow_from_their_firing_order(name: str, order:
 
 
 def test_backward_shares_of_hasselgruber() -> None:
-    """Hasselgruber 1964, eq. 33: none at 90 degrees, half of it upright; the V8's couple turns with the crank."""
+    """Check Hasselgruber 1964, eq. 33: zero at 90 degrees, half upright; the V8's couple turns with the crank."""
     assert _ready("vee-two-90", 1).force_against == pytest.approx(0.0, abs=1e-12)
     assert _ready("tractor-single", 1).force_against == pytest.approx(0.5)
     assert _ready("vee-eight-cross", 1).couple_against == pytest.approx(0.0, abs=1e-12)

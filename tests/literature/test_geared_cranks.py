@@ -62,7 +62,7 @@ class TestGearedTwin:
         assert solved("geared-twin").final.engine.firing_intervals == pytest.approx((2 * np.pi, 2 * np.pi))
 
     def test_gas_rolls_the_block_with_its_torque(self, tmp_path: Path) -> None:
-        """Pressure times the rate of the volume of both cylinders is what the output gets (eq. 20)."""
+        """Compare the torque with pressure times the rate of both volumes (eq. 20)."""
         problem = loaded(tmp_path, TWIN)
         engine, point = problem.engine, problem.points[0]
         steps = 2 * mm.STEPS

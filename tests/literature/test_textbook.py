@@ -97,7 +97,7 @@ class TestCrankPinLoad:
         assert self.rod.reciprocating_mass == pytest.approx(0.3, rel=1e-15)
 
     def test_mass_force(self) -> None:
-        """F_os = 7139 N, by eq. 12 of two orders; the exact mechanism gives 36 N more and is told apart."""
+        """Check F_os = 7139 N by two orders of eq. 12; the exact mechanism gives 36 N more, and differs."""
         assert self.mass_force(TWO_ORDER) == pytest.approx(7139, abs=self.mass_force_tolerance)
         assert self.mass_force(EXACT) - 7139 > 10 * self.mass_force_tolerance
 

@@ -110,7 +110,7 @@ class TestBalance:
     """Remaining forces, in units of one piston's first order."""
 
     def test_in_step_as_a_single_of_both_pistons(self) -> None:
-        """Half of the reciprocating mass in the weights leaves a backward force of half, and nothing forward."""
+        """Check that half the mass in the weights leaves half of the force, all backward."""
         forward, backward = _shares(_solved("parallel-360"), 1, (1, 2))
         assert (forward, backward) == pytest.approx((0.0, 1.0), abs=1e-5)
 
@@ -208,7 +208,7 @@ def _words(name: str) -> str:
 
 @pytest.mark.slow
 def test_the_picture_names_the_cranks_of_parallel_twins_alone() -> None:
-    """A vee on one pin has the throws of a parallel-360 and the crank of none."""
+    """Check that a vee on one pin, with throws of a parallel-360, has no such name."""
     assert "; crank parallel-270." in _words("twin-parallel-270")
     assert "parallel" not in _words("twin-vee-open")
 

@@ -121,7 +121,7 @@ def steps_of(rows: np.ndarray, grid: Grid) -> np.ndarray:
 @settings(max_examples=12)
 @given(x=COLUMNS)
 def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.ndarray) -> None:
-    """V0 + B x of every kind of quantity, row by row, is what evaluating the design gives, period by period."""
+    """Compare V0 + B x of every kind of quantity with the evaluated design, row by row and period by period."""
     p, m, affine = scene(cylinders), model(cylinders), at(cylinders, samples)
     periods = int(m.base / p.engine.cycle.base_order)
     x = x * affine.scales

@@ -96,7 +96,7 @@ class TestRefusals:
         assert engine(PART, rotors=(Rotor("w", 0.0, 1.0, Shaft("s", ratio)),)).shafts[1].ratio == ratio
 
     def test_opposed_cylinders_share_a_place_along_the_crank(self) -> None:
-        """Two banks at one x are no collision; neither are two cranks."""
+        """Check that two banks, or two cranks, at one x are no collision."""
         opposite = replace(OTHER, x=0.0, bank=math.pi, throw=math.pi)
         second = replace(OTHER, x=0.0, shaft=Shaft("crank 2", -1.0, y=0.3), name="cylinder 3")
         assert len(engine(PART, opposite, second).shafts) == 2

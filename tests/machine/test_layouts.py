@@ -150,7 +150,7 @@ class TestOpposedPistons:
         assert np.degrees(engine.firing_intervals) == pytest.approx([120.0] * 3)
 
     def test_pistons_back_to_back_share_no_chamber(self) -> None:
-        """Pistons that move away from each other's crank share none: a boxer, and cranks the other way up."""
+        """Check a boxer, and cranks with pistons that move away from each other."""
         boxed, _ = build(FOUR, boxer(2, 0.1, 0.0), MECHANISM, (math.pi / 2, -math.pi / 2))
         assert not boxed[0].faces(boxed[1])
         low, high = (self.of(-1.0).slider_cranks[k] for k in (0, 3))

@@ -27,7 +27,7 @@ class TestRod:
     def test_two_masses_keep_mass_and_centre_of_gravity(
         self, length: float, mass: float, share: float, inertia: float
     ) -> None:
-        """Eqs. (9), (10): mass and centre of gravity are kept, the deficit is what is missing to the inertia."""
+        """Check eqs. (9), (10) for mass and centre of gravity, and the deficit of the inertia."""
         rod = Rod(length, mass, share * length, inertia)
         pin, crank = rod.reciprocating_mass, rod.rotating_mass
         assert pin + crank == pytest.approx(mass)

@@ -63,7 +63,7 @@ def test_an_x_of_six_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("norm", ["mean", "maximum", "rms", "rmq"])
 def test_mounts_on_rigid_ground_carry_the_shaking_force(norm: str, tmp_path: Path) -> None:
-    """The resultant of the mounts is the shaking force, whatever the mounts are (Newton's second law)."""
+    """Check that the resultant of any mounts is the shaking force (Newton's second law)."""
     text = (PROBLEMS / "tractor-two.toml").read_text(encoding="utf-8")
     loads = (f"{norm} resultant mount force", f"{norm} shaking force")
     problems = [loaded(tmp_path, text.replace("mean mount force", load)) for load in loads]

@@ -181,7 +181,7 @@ min = "6.27862 Hz"
 
 
 def test_one_number_on_a_limit_is_proven_by_a_few_boxes(tmp_path: Path) -> None:
-    """A grid over the one number finds nothing better."""
+    """Check by a grid over the one number that no design is better."""
     problem = problem_of(tmp_path, ONE)
     result = solve(problem)
     assert result.status == "optimal"
@@ -260,7 +260,7 @@ unbalances = [{ x = "35 mm", radius = "40 mm", unbalance = { between = ["0 kg m"
 
 @pytest.mark.parametrize("limit", ['maximum mount force"\nmax = "0 N"', 'maximum mount travel"\nmax = "0 mm"'])
 def test_a_limit_on_an_order_that_no_load_has_stands_at_zero(tmp_path: Path, limit: str) -> None:
-    """Four throws in a plane have no first order: the limit is kept, and a search has nothing to hold."""
+    """Check a limit on order 1 of four throws in a plane, which is zero for all designs."""
     text = '[objective]\nminimise = "rms mount force"\n[search]\nstarts = 1\nboxes = 0\n'
     text += f'[[constraints]]\norders = [1]\nlimit = "{limit}\n'
     result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, text))

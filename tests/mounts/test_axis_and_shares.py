@@ -123,7 +123,7 @@ def test_no_design_of_a_box_is_under_its_bound(tmp_path, objective):
 
 
 def test_every_mode_of_modes_that_coincide_is_allowed_its_share():
-    """Two modes of one frequency may turn into each other, whatever rounding says of their frequencies."""
+    """Check two modes of one frequency, which mix in any way under rounding."""
     r = np.random.default_rng(4)
     for _ in range(20):
         root, basis = r.normal(size=(6, 6)) + 3.0 * np.eye(6), np.linalg.qr(r.normal(size=(6, 6)))[0]

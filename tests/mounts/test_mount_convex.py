@@ -120,7 +120,7 @@ def test_any_multipliers_give_a_bound_and_those_of_the_solver_the_best(tmp_path,
 
 
 def test_slopes_of_a_bound_are_those_of_the_optimum(tmp_path):
-    """A stiffness at its bound has the gradient of the objective, the others none."""
+    """Check that only a stiffness at its bound has the gradient of the objective."""
     problem = least_squares(tmp_path)
     program = program_of(problem)
     x, z = program.solve()

@@ -199,7 +199,7 @@ def test_throws_that_may_move_are_never_worse_and_keep_their_intervals(decided, 
 
 @pytest.mark.slow
 def test_a_limit_that_only_throws_move_has_the_price_of_a_looser_one(tmp_path):
-    """No mount moves the torque of the crank: its limit would cost nothing but for the throws."""
+    """Check the price of a limit on crank torque, which no mount changes."""
     engine = ENGINE.partition("[[counterweights]]")[0]
 
     def found(maximum):

@@ -111,7 +111,7 @@ def test_equal_power_does_not_rebuild_a_block_on_springs(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_shafts_are_sized_for_transmissibility(tmp_path: Path) -> None:
-    """Without its shaft the engine still minimises what its mounts transmit, and decides their stiffness."""
+    """Check that an engine without its shaft minimises transmissibility with its mounts."""
     objective = '[objective]\nminimise = "transmissibility"\norders = [2]\n'
     stiff = changed(MOUNTS, ('"4000 N/mm"', '"300 N/mm"'), ("400 N/mm", "200 N/mm"))
     path = study(tmp_path, "balancer sizing", problem=SHAFT + objective)
@@ -124,7 +124,7 @@ def test_shafts_are_sized_for_transmissibility(tmp_path: Path) -> None:
 
 
 def test_limits_are_swept_in_their_own_dimension() -> None:
-    """A limit is text in the problem file; what it limits tells its unit, and plain numbers stay text."""
+    """Check that a swept limit has the unit of its quantity, and that plain numbers stay text."""
     ratio = axis_of(SweepTable.model_validate({"quantity": LIMIT, "from": "0.2", "to": "0.4", "points": 3}))
     assert ratio.values == ("0.2", "0.3", "0.4")
     assert (ratio.unit, ratio.numbers) == ("1", (0.2, 0.3, 0.4))

@@ -42,7 +42,7 @@ def test_light_damping_near_resonance_too():
 
 @pytest.mark.parametrize("tolerance", [1e-11, INTEGRATION, 1e-7])
 def test_a_mean_torque_on_soft_mounts_settles(tolerance):
-    """An idling four-cylinder: what the integration rounds moves the start, and the period is closed all the same."""
+    """Check that the period of an idling four-cylinder closes despite rounding of the integration."""
     turned = ((3**0.5 / 2, 0.0, 0.5), (0.0, 1.0, 0.0), (-0.5, 0.0, 3**0.5 / 2))
     mounts = [
         Mount("right", (0.15, -0.3, 0.12), (40e3, 40e3, 60e3), loss_factor=0.12),

@@ -129,7 +129,7 @@ class TestEveryNorm:
 
     @given(rows())
     def test_kinks_touch_the_norm(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
-        """Each of the dual rows that are told attains the norm to what counts as touching (P19)."""
+        """Check that each of the dual rows attains the norm to the tolerance of touching (P19)."""
         weights, v, _ = data
         grid = one_signal(weights)
         whole, z = norm.value(grid, v), norm.subgradient(grid, v)
@@ -198,7 +198,7 @@ class TestEveryNorm:
         )
 
     def test_sizes_side_by_side(self, norm: Norm) -> None:
-        """A row of 1e200 beside one of 1e-200 hides it and breaks nothing."""
+        """Check a row of 1e200 beside one of 1e-200."""
         grid, v = Grid(np.array([0.5, 0.5]), 2), np.array([[1e200, 0.0], [0.0, 1e-200]])
         assert norm.value(grid, v) == pytest.approx(1e200 * norm.value(grid, np.array([[1.0], [0.0]])), rel=ROUNDING)
         assert lengths(v).tolist() == [1e200, 1e-200]
@@ -371,7 +371,7 @@ class TestDualRows:
 
     @given(SEEDS)
     def test_subgradient_spread_bounds_the_finer_norm(self, norm: Norm, seed: int) -> None:
-        """<Z, V> on the finer grid is under the norm there, whatever the coarse grid said."""
+        """Check that <Z, V> on the finer grid is not above the norm there."""
         grid, signals, _ = scene(seed)
         z = norm.refined_dual(norm.subgradient(grid, sampled(signals, grid.steps)), grid.steps, 4)
         v = sampled(signals, 4 * grid.steps)

@@ -263,7 +263,7 @@ def test_weights_at_a_fixed_angle_are_bounded() -> None:
 
 
 def test_weights_that_depend_on_pin_offsets_have_no_boxes() -> None:
-    """A share of what turns on offset pins is another weight at every offset: a bound from one would be false."""
+    """Check that shares of masses on offset pins, which change with the offset, have no box bound."""
     share = '[[counterweights]]\nname = "share"\nbalance_factor = 0.5\n'
     problem = _read(SPLIT + MOUNTS + share + _objective("rms shaking force"))
     near, far = (abs(_at(problem, angle, False).engine.rotors[-1].unbalance) for angle in problem.phasing.split)

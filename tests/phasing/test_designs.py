@@ -127,7 +127,7 @@ def test_a_shaft_that_has_to_be_heavy_is_left_out_where_it_harms(tmp_path):
 
 
 def test_a_shaft_that_no_design_needs_is_not_built(tmp_path):
-    """Nothing of a three has order 3, and weights leave nothing else to gain."""
+    """Check a shaft of order 3 on a three-cylinder engine without that order."""
     shafts = engines.shaft("against", -1) + engines.shaft("third", 3)
     result = solve(engines.problem(tmp_path, 3, rest=engines.MOUNTS + engines.WEIGHTS + shafts + engines.MOUNT_FORCE))
     built = {d.name: d.value for d in result.decisions if d.name.endswith("built")}
@@ -159,7 +159,7 @@ def test_designs_marked_as_proven_are_the_best(tmp_path):
 
 
 def test_designs_count_once_with_their_mirror_images_alone(tmp_path):
-    """An equal value of another star counts anew, and so does a mirror image with another value."""
+    """Check that mirror images of one value count once, and other stars or values anew."""
     model, _ = model_of(engines.problem(tmp_path, 5, rest=CASES["mean"]))
     first, mirrored, other = (0, 1, 2, 3, 4), (0, 4, 3, 2, 1), (0, 2, 1, 3, 4)
     given = [(first, 1.0), (mirrored, 1.0), (other, 1.0), (mirrored, 2.0)]
@@ -234,7 +234,7 @@ GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "7 bar"\n'
 
 @pytest.mark.parametrize("measure", ["rms roll moment", "mean mount force"])
 def test_given_throws_get_the_firing_order_that_gas_likes_best(tmp_path, measure):
-    """Throws that fire unevenly: the objective differs from order to order, and none of them is under the bound."""
+    """Check that no firing order of uneven throws is below the bound."""
     rest = engines.MOUNTS + GAS + f'[objective]\nminimise = "{measure}"\n'
     wide = 'intervals = { min = "20 deg", max = "700 deg" }'
 
@@ -285,7 +285,7 @@ def test_a_cancelled_order_sets_no_scale_for_unbalances(tmp_path, cylinders, mea
 
 
 def test_a_limit_at_its_edge_excludes_no_star(tmp_path):
-    """A mean read at 48 angles is up to 1 % over that of the cycle; nothing open acts on order 2."""
+    """Check a limit on order 2, whose mean 48 angles overestimate by up to 1 %."""
     rest = engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
     free = engines.problem(tmp_path, 5, rest=rest)
     limit = '[[constraints]]\nlimit = "mean mount force"\norders = [2]\nmax = "{:.9g} N"\n'
@@ -324,7 +324,7 @@ def test_initial_angles_are_those_of_the_evaluated_design(bank, split):
 
 
 def test_a_star_that_breaks_a_constant_limit_is_no_design(tmp_path):
-    """Weights of order 1 move nothing of order 2: its own couple keeps the limit or breaks it, star by star."""
+    """Check a limit on order 2, which weights of order 1 do not change, star by star."""
     rest = engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
     limit = '[[constraints]]\nlimit = "rms rocking couple"\norders = [2]\nmax = "{:.9g} N m"\n'
     model, stars = model_of(engines.problem(tmp_path, 4, rest=rest + limit.format(1e6)))

@@ -58,7 +58,7 @@ def test_slightly_uneven_angles_cut_the_couple(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["inline-seven-uneven", "two-stroke-eight-uneven"])
 def test_a_ranking_has_no_crank_twice(name):
-    """Several starts lead to the best crank of these; a rank is told by its throws and how it fires."""
+    """Check ranks by throws and firing order, where several starts end at one crank."""
     ranked = solved(name).phasing.ranking
     assert len(ranked) > 3
     for one, other in itertools.combinations(ranked, 2):

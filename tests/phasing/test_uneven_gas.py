@@ -238,7 +238,7 @@ def test_an_uneven_crank_speed_is_refused(tmp_path):
 
 
 def test_throws_between_bounds_start_at_their_most_even_firing(tmp_path):
-    """Gas of the design as given needs a firing order, though none is named."""
+    """Check that the initial throws within bounds have an even firing order, though none is given."""
     engine = "throws = [0, { between = [170, 190] }, { between = [170, 190] }, { between = [-10, 10] }]"
     problem = engines.problem(tmp_path, 4, "four-stroke", engine, ALLOWED, GAS + MOUNT_FORCE)
     assert problem.engine.firing_intervals == pytest.approx([math.pi] * 4, abs=1e-9)

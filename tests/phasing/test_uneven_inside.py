@@ -306,6 +306,6 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
 
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
 def test_orders_matter_by_their_share_of_the_largest_motion(unit: float) -> None:
-    """In any unit of the load; high orders move the block by less, and a load of nothing moves it not at all."""
+    """Check orders by motion of the block in any unit of load, and for zero loads."""
     sizes, orders = np.array([1.0, 0.5, 0.0, 1e-12, 0.8]), np.array([0.0, 1.0, 2.0, 3.0, 1e6])
     assert relevant_orders(unit * sizes, orders).tolist() == [0, 1]

@@ -133,6 +133,6 @@ def test_bad_shares_are_one_line(more: Any, said: str) -> None:
 
 @pytest.mark.slow
 def test_masses_and_shares_together_are_searched() -> None:
-    """A torque that grows with the mass, times the share: no cone program has it."""
+    """Check a product of mass and share, which no cone program states."""
     engine = {**tables_of(READY)["engine"], "reciprocating_mass": {"between": ["0.4 kg", "0.6 kg"]}}
     searched(problem_of(engine=engine))

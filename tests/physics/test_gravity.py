@@ -119,7 +119,7 @@ def test_irregularity_and_stored_work_count_the_weights() -> None:
 
 
 def test_an_energy_balance_over_the_cycle_holds() -> None:
-    """Kinetic energy changes by the work of the gas and what the weights give (F2)."""
+    """Compare kinetic energy with the work of gas and weights (F2)."""
     problem = weighed("tractor-three", operating_points=[{"name": "p", "speed": "300 rpm", "misfire": [2]}])
     engine, point = problem.engine, problem.points[0]
     swing, plain = (swing_of(e, point, EXACT) for e in (engine, replace(engine, gravity=False)))

@@ -344,7 +344,7 @@ class TestGas:
         assert mean.real == pytest.approx(work / engine.cycle.angle, rel=2e-3)
 
     def test_crankcase_pressure_acts_from_below(self) -> None:
-        """A cylinder as full as its crankcase does nothing to the crank."""
+        """Check that a cylinder at crankcase pressure gives no torque."""
         trace = PressureTrace(tuple(np.radians(np.arange(0, 360, 10)).tolist()), (2e5,) * 36, 2e5)
         part = SliderCrank("cylinder 1", 0.0, 0.06, 0.2, 1.0, bore=0.1)
         engine = Engine("single", Cycle.TWO_STROKE, (part,))
@@ -354,7 +354,7 @@ class TestGas:
         assert np.abs(gas_loads(engine, other, COARSE).coefficients[1, 3]) == pytest.approx(expected, rel=0.05)
 
     def test_half_orders_matter(self) -> None:
-        """A four-stroke's gas has half orders, larger than those above the second; a two-stroke's has none."""
+        """Check half orders of a four-stroke's gas, larger than those above the second; a two-stroke has none."""
         part = SliderCrank("cylinder 1", 0.0, 0.06, 0.06 / 0.26, 1.25, bore=0.1)
         loads = gas_loads(Engine("single", Cycle.FOUR_STROKE, (part,)), GAS)
         halves = np.abs(loads.coefficients[1::2, 3])
@@ -413,7 +413,7 @@ class TestStars:
         assert abs(loads[2]) == pytest.approx(force * math.radians(0.01), rel=1e-3)
 
     def test_geared_twin_crank_cancels_lateral_forces(self) -> None:
-        """A second crank that runs against its partner leaves twice the vertical force and nothing across."""
+        """Check twice the vertical force and zero lateral force of two contra-rotating cranks."""
 
         def engine(ratio: float) -> Engine:
             parts, rotors = [], []

@@ -120,7 +120,7 @@ def test_an_uneven_crank_follows_the_load() -> None:
 
 
 def test_geared_inertia_takes_its_share_of_the_load() -> None:
-    """The second shaft speeds up with what the load leaves (L8); gas and load do not grow with the speed."""
+    """Check L8: the second shaft takes its share of the load; gas and load are independent of speed."""
     problem = problem_of("geared-inertia", geared_inertias=[{"name": "second", "ratio": -1.0, "share": 0.3}])
     engine, point = problem.engine, problem.points[0]
     moved = shaking_loads(engine, point)

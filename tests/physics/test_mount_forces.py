@@ -122,7 +122,7 @@ class TestStatics:
         _assert_close(forces(turned, load), forces(mounts, wrench) @ turn.T)
 
     def test_a_quarter_turn_swaps_stiffnesses(self) -> None:
-        """A mount turned by 90 degrees about x carries with its y what it carried with its z."""
+        """Check that a mount rotated by 90 degrees about x carries with y as before with z."""
         turn = as_rows(rotation((math.pi / 2, 0.0, 0.0)).T)
         corners = [(0.5, 0.2, 0.0), (0.5, -0.2, 0.0), (-0.5, 0.0, 0.1)]
         turned = [Mount(f"{k}", p, (1.0, 2.0, 3.0), turn) for k, p in enumerate(corners)]
@@ -132,7 +132,7 @@ class TestStatics:
 
     @given(mountings(), WRENCHES)
     def test_a_stiff_mount_beside_soft_ones(self, mounts: tuple[Mount, ...], wrench: NDArray[np.complex128]) -> None:
-        """A ratio of 1e9 keeps the balance of forces and moments; the stiff mount takes what acts through it."""
+        """Check balance at a stiffness ratio of 1e9; the stiff mount takes the load through it."""
         x, y, z = mounts[0].stiffness
         stiff = (replace(mounts[0], stiffness=(1e9 * x, 1e9 * y, 1e9 * z)), *mounts[1:])
         through = np.concatenate([wrench[:3], np.cross(np.array(mounts[0].position), wrench[:3])])
@@ -206,7 +206,7 @@ class TestUncarried:
         ],
     )  # fmt: skip
     def test_is_refused_by_name(self, mounts: Sequence[Mount], component: str) -> None:
-        """The message names the order and the direction that is driven, and what to do."""
+        """Check that the message names order, direction and remedy."""
         with pytest.raises(UncarriedLoadError, match=rf"order 1 drives the engine along {component}, .*; give"):
             rigid_mounting(tuple(mounts)).forces(driven(100.0 * unit(component)))
 
@@ -263,7 +263,7 @@ class TestUncarried:
     @pytest.mark.parametrize("arm", [0.02, 1.0, 50.0])
     @pytest.mark.parametrize("component", range(6))
     def test_the_share_that_is_left_to_rounding_is_of_the_largest_load(self, arm: float, component: int) -> None:
-        """Moments count by the arm of the mounts, whatever their unit makes of them."""
+        """Check that moments count by the arm of the mounts in any unit."""
         scales = np.array([1.0, 1.0, 1.0, arm, arm, arm])
         free = np.eye(6)[[component]]
         mounting = RigidMounting(np.zeros((1, 3, 6)), free, arm)

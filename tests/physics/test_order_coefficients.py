@@ -123,7 +123,7 @@ class TestAgainstManyDigits:
             assert _error(computed[h], exact[h]) <= RELATIVE * abs(exact[h]), f"order {h}"
 
     def test_vanishing_offset(self) -> None:
-        """Odd orders are linear in a small offset, down to the smallest floats; even orders do not feel it."""
+        """Check that odd orders are linear in offsets down to the smallest floats, and even ones constant."""
         tiny, small = (piston_acceleration_orders(0.26, offset_ratio, HIGHEST) for offset_ratio in (1e-300, 1e-12))
         for h in range(3, HIGHEST, 2):
             assert tiny[h].imag / 1e-300 == pytest.approx(small[h].imag / 1e-12, rel=RELATIVE)
@@ -260,7 +260,7 @@ class TestProperties:
 
     @given(crank=turning_cranks())
     def test_part_and_whole(self, crank: tuple[float, float]) -> None:
-        """Few or many orders asked for are the same, and what the whole leaves off is under a rounding of the rest."""
+        """Check that few orders equal the first of many, with a remainder below rounding."""
         whole = piston_acceleration_orders(*crank)
         part = piston_acceleration_orders(*crank, 6)
         count = min(len(whole), len(part))

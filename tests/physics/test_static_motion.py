@@ -23,7 +23,7 @@ def four_mounts(stiffness: float, **more: float) -> ElasticMounting:
 
 
 def test_a_steady_load_turns_the_block_only_where_mounts_resist() -> None:
-    """F / k where they do, whatever else is free; a load along what is free names the motion and the remedy."""
+    """Check F / k where mounts resist, and the message for a load along a free motion."""
     held = np.diag([4e5, 5e5, 0.0, 2e4, 3e4, 6e4])
     modes = modes_of(np.diag([50.0, 50.0, 50.0, 1.0, 2.0, 3.0]), held)
     wrench = np.array([100.0, -40.0, 0.0, 3.0, 0.0, 9.0])

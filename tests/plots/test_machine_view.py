@@ -86,7 +86,7 @@ def test_cylinders_are_numbered_where_they_do_not_cover_each_other(name: str, ah
 
 
 def test_a_weight_stands_where_no_rod_runs() -> None:
-    """It is drawn in halves on the webs if its plane is that of a rod, and where the file has it if not."""
+    """Check halves on the webs if its plane is that of a rod, else the place of the file."""
     bores = {"tractor-single": 0.1, "tractor-six-bearings": 0.1}
     for name, bore in bores.items():
         view = EngineView.from_result(evaluate_only(load(PROBLEMS / f"{name}.toml")))

@@ -122,7 +122,7 @@ def test_polar_diagrams_share_one_scale() -> None:
 
 
 def test_forces_along_one_line_are_shown_over_the_crank_angle() -> None:
-    """The path of a force that is all but vertical is a needle, which shows nothing."""
+    """Check that a nearly vertical force is drawn over the crank angle, not as a path."""
     path = np.zeros((9, 1, 3))
     path[:, 0, 2] = np.sin(np.linspace(0.0, 2.0 * np.pi, 9))
     for lateral, along, times in ((0.01, polar.VERTICAL, 20), (0.09, None, 10), (0.6, None, 1)):

@@ -238,7 +238,7 @@ class TestCounterweights:
 
 @given(VALUES)
 def test_loads_change_by_those_of_the_rotors_decided(folder: Path, value: complex) -> None:
-    """The exact model is linear in the decision: what it adds is what its rotors make alone."""
+    """Check that the exact model is linear in a decision: it adds the loads of its rotors."""
     problem = problem_of(folder, coupled("mirrored", "opposite"))
     design, bare = problem.design([value]), problem.design([0.0])
     (with_it,), (without,) = evaluate(problem, design).loads, evaluate(problem, bare).loads

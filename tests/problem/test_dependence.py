@@ -282,7 +282,7 @@ def test_no_star_moves_what_is_constant() -> None:
     ],
 )
 def test_an_extension_speaks_of_its_own_channels_alone(line: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another line about a channel of the package would change what is proven of it."""
+    """Check that an extension cannot add a line about a channel of the package."""
     monkeypatch.setattr(module, "extensions", lambda: [Extension("own", dependences=(line,))])
     with pytest.raises(ModelError, match=said):
         module._with_extensions(module.TABLE)

@@ -183,7 +183,7 @@ class TestBound:
             assert bound.value <= max(plane, 0.0) + 1e-10 * (1.0 + abs(plane))
 
     def test_is_tight_where_it_can_be(self) -> None:
-        """|x - 1| on [2, 3]: the bound is 1, the objective at 2, and nothing more is to be won."""
+        """Check |x - 1| on [2, 3]: the bound and the objective at 2 are 1."""
         norm = AffineNorm(NORMS["mean"], np.array([[-1.0]]), np.array([[[1.0]]]), Grid(np.ones(1), 1))
         domains = domains_of((Decision("d", "kg m", Interval(2.0, 3.0), 0j, ()),))
         problem = AffineProblem(((1.0, norm),), (), domains, 1)

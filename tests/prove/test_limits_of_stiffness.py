@@ -50,7 +50,7 @@ def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
 
 
 def test_feasible_limits_are_no_part_of_a_conflict(tmp_path: Path) -> None:
-    """A limit on forces that no search meets says nothing of sag, which all designs keep."""
+    """Check that an infeasible limit on forces does not name sag, which all designs keep."""
     text = """
     [search]
     starts = 1

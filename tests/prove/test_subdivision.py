@@ -175,7 +175,7 @@ def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
 
 
 def test_a_box_with_a_soft_corner_has_a_line_below_its_sag(tmp_path: Path) -> None:
-    """No design of it is under the line, which is zero where the middle carries nothing either."""
+    """Check that no design is below the line, which is zero if the middle carries no load either."""
     bottomless = changed(MOUNTS, *[('"20 N/mm", "4000 N/mm"', '"0 N/mm", "4000 N/mm"')] * 2)
     problem = stiffness_problem(tmp_path, 'minimise = "static sag"', mounts=bottomless)
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
@@ -245,7 +245,7 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
     [OBJECTIVES["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"\norders = [2]'],
 )
 def test_few_open_stiffnesses_are_decided_with_proof(objective: str, tmp_path: Path) -> None:
-    """A search over a grid of all designs, which knows nothing of boxes, finds nothing better either."""
+    """Check by a grid of all designs that none is better."""
     limit = '[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n[search]\nstarts = 2\n'
     problem = replace(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]", objective, limit), tolerance=1e-3)
     result = solve(problem)

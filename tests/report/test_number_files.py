@@ -248,7 +248,7 @@ def test_pages_of_a_workbook_have_names_that_it_takes(tmp_path: Path) -> None:
 
 
 def test_cells_of_a_workbook_are_those_of_the_sheet(tmp_path: Path) -> None:
-    """Numbers, truths and texts of every kind; what is no finite number is empty."""
+    """Check numbers, truths and texts; a number that is not finite is empty."""
     numbers = [1.5e-300, 1 / 3, 12, np.float64(0.1), np.int64(7)]
     row = [*numbers, True, np.False_, "a < b", "https://a", "12", "", None, math.inf, math.nan, np.float64("nan")]
     head = [f"column {k}" for k in range(len(row))]

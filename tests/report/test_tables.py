@@ -191,7 +191,7 @@ def test_markdown_in_names_means_nothing() -> None:
 
 
 def test_the_winning_star_is_explained_by_its_free_couples() -> None:
-    """Rocking couples of a five: what is minimised is the couple of orders 1 and 2, so order 4 is not named."""
+    """Check rocking couples of a five, minimised over orders 1 and 2, without a word on order 4."""
     result = solved("inline-five-open")
     assert why_star(result) == (
         "Star 1 beats star 2 by 32 %. Its throws leave a smaller couple of order 1 (0.449 against 1.56). "
@@ -271,7 +271,7 @@ def test_numbers_of_a_study_stand_below_each_other() -> None:
 
 
 def test_rocking_couples_are_shown_by_axis() -> None:
-    """Three upright cylinders pitch alone; the couple of four in a flat plane is nothing."""
+    """Check that three upright cylinders pitch only, and that four in a plane have no couple."""
     pitching = laufruhe.evaluate(laufruhe.load("tractor-three"))
     whole, by_axis = loads.orders(pitching)
     assert by_axis.title.startswith("Rocking couple by axis")

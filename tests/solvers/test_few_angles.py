@@ -82,7 +82,7 @@ def test_time_that_ran_out_is_no_proof() -> None:
 
 
 def test_a_mean_that_is_all_but_least_is_sought_at_more_angles() -> None:
-    """The force is no less than 1071.66270 N, which 768 angles of two turns do not tell."""
+    """Check a force of at least 1071.66270 N, which 768 angles of two turns misread."""
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 180.7}]}
     tables = {
@@ -95,7 +95,7 @@ def test_a_mean_that_is_all_but_least_is_sought_at_more_angles() -> None:
 
 @pytest.mark.parametrize("samples", [180, 480])
 def test_a_limit_that_is_all_but_the_least_has_a_design(samples: int) -> None:
-    """The force is no less than 1071.66270 N, which is over this limit by half of what counts as kept."""
+    """Check a limit that the least force of 1071.66270 N exceeds by half of the tolerance."""
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183.1}]}
     tables = {

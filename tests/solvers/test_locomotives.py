@@ -40,7 +40,7 @@ def solved() -> Result:
 
 @pytest.mark.parametrize("share", [0.15, 0.75])
 def test_least_hammer_blow_is_that_of_the_balanced_share(share: float) -> None:
-    """B9: whatever stands in the wheels, a share of each crank's mass does no worse."""
+    """Check B9: a share of each crank's mass is no worse than any weights in the wheels."""
     result = laufruhe.solve(limited(share))
     assert result.certificate.kind == "global"
     assert result.objective.value == pytest.approx(

@@ -113,7 +113,7 @@ EDGES = {
 @pytest.mark.parametrize("measure", [f"{norm} {load}" for norm, load in zip(NORMS, (*LOADS, *LOADS), strict=False)])
 @pytest.mark.parametrize("case", EDGES)
 def test_minimal_problems(case: str, measure: str, tmp_path: Path) -> None:
-    """A design with its bound, no worse than the one given; under a limit of nothing, the same or that limit named."""
+    """Check a design no worse than the initial one, with its bound; a limit of zero is kept or named."""
     mass, count, weights = EDGES[case]
     text = ENGINE.format(mass=mass, throws=[97 * k % 360 for k in range(count)], measure=measure)
     for x, size, angle in weights:

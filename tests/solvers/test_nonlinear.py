@@ -256,7 +256,7 @@ def test_starts_cover_every_variable_evenly_and_repeat_by_seed():
 
 
 def test_a_largest_of_many_rows_ends_no_worse_than_where_it_starts():
-    """A hundred rows that are slack at the far end draw the path of a barrier there, whatever the start (N2)."""
+    """Check ends of near and far starts with a hundred slack rows, which draw a barrier method away (N2)."""
     z = ca.SX.sym("z", 2)
     x, top = z[0], z[1]
     high, rows = 1.0 - 0.2 * ca.exp(-((x / 0.3) ** 2)) - 0.05 * x, 100

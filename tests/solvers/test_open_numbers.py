@@ -88,7 +88,7 @@ def _minimum() -> tuple[float, ...]:
 
 
 def test_a_pin_offset_and_a_stroke_are_those_of_an_independent_search(tmp_path: Path) -> None:
-    """The offset brings the piston near the middle of the mounts, and the stroke stays what the piston travels."""
+    """Check that the offset centres the piston between the mounts, and that the stroke is its travel."""
     result = searched(loaded(tmp_path, ASIDE))
     on_grid, minimum, stroke, offset, share = _minimum()
     decided = {entry.name: entry.value for entry in result.decisions}
@@ -116,7 +116,7 @@ def test_every_value_is_that_of_a_file_with_it(stroke: float, offset: float, sha
 
 
 def test_dependent_keys_follow_an_open_number(tmp_path: Path) -> None:
-    """Spacing moves the throws, a speed the loads, and places of rigid mounts what they carry."""
+    """Check that spacing moves the throws, a speed the loads, and places of mounts the forces."""
     text = changed(ASIDE, "throws = [0]", 'throws = [0, 180]\ncylinder_spacing = { between = ["90 mm", "120 mm"] }')
     problem = loaded(tmp_path, text)
     spacing = next(decision for decision in problem.decisions if decision.name == "engine.cylinder_spacing")

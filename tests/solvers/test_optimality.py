@@ -245,7 +245,7 @@ def test_sampling_does_not_decide() -> None:
 
 
 def test_several_points_and_terms() -> None:
-    """A weighted sum over two speeds is what its parts add up to, and SLSQP finds no better."""
+    """Check that a weighted sum over two speeds is that of its parts, and compare with SLSQP."""
     p = four()
     slow = replace(p.points[0], name="slow", speed=0.6 * p.points[0].speed, weight=3.0)
     both = replace(

@@ -55,7 +55,7 @@ def test_points_are_read_as_written(tmp_path: Path) -> None:
 
 
 def test_a_byte_changed_anywhere_costs_one_point(tmp_path: Path) -> None:
-    """A point is as it was kept, or it is none; an end of line may be lost without harm, there are two."""
+    """Check that a changed byte loses one point at most, and a lost line end none."""
     path = tmp_path / FINISHED_POINTS
     content = written(path)
     rng = random.Random(1)

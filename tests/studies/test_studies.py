@@ -150,7 +150,7 @@ def test_sizing_has_every_set_of_shafts_once(tmp_path: Path) -> None:
 
 
 def test_limits_on_absent_shafts_are_none(tmp_path: Path) -> None:
-    """The mass of shafts is limited in this file; the plain engine has none to limit."""
+    """Check a limit on the mass of shafts for the plain engine without shafts."""
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     assert problem.limits
     data = computed(study(tmp_path, part("balancer sizing", ["tractor-four-lanchester"])))

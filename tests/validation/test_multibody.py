@@ -293,7 +293,7 @@ def test_simulation_extrapolated_to_no_step_agrees(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "share"), [("single", 0.40), ("four-cylinder", 0.08)])
 def test_rod_of_two_masses_gets_the_roll_moment_wrong(name: str, share: float) -> None:
-    """Without the inertia deficit the roll moment is out by tens of percent of a cylinder's, and nothing else is."""
+    """Check that without the inertia deficit the roll moment alone is wrong, by tens of percent."""
     case, reference = case_of(name), simulated(name, FINE).reactions
     bare = tuple(replace(part, rod_inertia_deficit=0.0) for part in case.engine.slider_cranks)
     without = replace(case, engine=replace(case.engine, slider_cranks=bare))

@@ -248,7 +248,7 @@ def result_with_reach(problem: Problem, status: Status, seconds: float | None = 
 
 @pytest.mark.slow
 def test_a_design_that_was_overlooked_is_the_result() -> None:
-    """Whatever a method says: what the exact model shows to keep all limits is a design."""
+    """Check that a design that keeps all limits by the exact model is returned against a method's claim."""
     for status in (Status.FAILED, Status.INFEASIBLE):
         result = result_with_reach(problem_of([LIGHT | {"max": "2 kg"}, QUIET | {"max": "2 kN"}]), status)
         assert result.status is Status.FEASIBLE

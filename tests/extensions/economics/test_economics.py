@@ -52,7 +52,7 @@ def test_front_falls_is_proven_and_convex() -> None:
 
 
 def test_points_of_a_front_are_designs_of_the_exact_model() -> None:
-    """The force of a point is what an engine built so makes, evaluated from its parts."""
+    """Compare the force of a point with that of an engine built from its parts."""
     problem = load(FOUR)
     limit = Limit("all shafts", Measure(channels.BALANCER_MASS, NORMS["mean"]), 0.5)
     result = solve(replace(problem, limits=(*problem.limits, limit)))

@@ -23,7 +23,7 @@ ECONOMICS = [part for part in _STUDY["parts"] if part["kind"] == "economics"]
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", first_fast([0, 3, 5], 0, long=(3, 5)))
 def test_random_economics_have_fronts_that_fall(seed: int, tmp_path: Path) -> None:
-    """More mass is never worse, nor are more shafts; every bound lies under its value."""
+    """Check that more mass and more shafts are never worse, and that every bound is below its value."""
     rng = random.Random(seed)
     part = copy.deepcopy(rng.choice(ECONOMICS))
     part |= {"name": "p", "mass_limits": [f"{m:.3g} kg" for m in sorted(rng.uniform(0.0, 3.0) for _ in range(3))]}

@@ -47,7 +47,7 @@ def test_the_torque_of_plain_cylinders_is_the_roll_moment(name: str) -> None:
 
 
 def test_its_mean_is_the_work_of_the_gas() -> None:
-    """Indicated work is mean pressure times swept volume, whatever the masses do (textbook 2.6)."""
+    """Check that the mean is mean pressure times swept volume for any masses (textbook 2.6)."""
     problem = laufruhe.load(PROBLEMS / "tractor-four-lanchester.toml")
     engine, (point,) = problem.engine, problem.points
     swept = sum(part.piston_area * part.stroke for part in engine.slider_cranks)
@@ -113,7 +113,7 @@ def exact(inertia: float) -> Fidelity:
 
 @pytest.mark.parametrize("name", ["tractor-single", "tractor-three", "vee-six-90", "radial-seven"])
 def test_the_degree_never_rises_with_the_inertia(name: str) -> None:
-    """T4: down to flywheels of the inertia of the pistons themselves, where the speed goes near to nothing."""
+    """Check T4 down to the inertia of the pistons, where the speed nearly vanishes."""
     engine, point = case(name)
     swing = swing_of(engine, point)
     inertias = np.geomspace(0.05, 1e4, 60) * float(swing.inertia.max())

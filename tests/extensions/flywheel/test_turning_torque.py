@@ -69,7 +69,7 @@ def test_a_crank_is_turned_against_compression_and_weights(name: str, gravity: b
 
 
 def test_states_and_single_cylinders_have_their_own_compression() -> None:
-    """A misfire compresses as before; a cut cylinder with open valves does not; speed changes nothing."""
+    """Check that a misfire compresses, a cut cylinder with open valves does not, at any speed."""
     fired = needed(problem_of("tractor-three", operating_points=[{"name": "p", "speed": "900 rpm"}]))
     point = {"name": "p", "speed": "2000 rpm"}
     missed = needed(problem_of("tractor-three", operating_points=[{**point, "misfire": [2]}]))

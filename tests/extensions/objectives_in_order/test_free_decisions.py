@@ -74,7 +74,7 @@ SCENES = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_two_weights_in_one_place_are_free_against_each_other(name: str) -> None:
-    """Their sum alone counts, so the ends follow from it and from what each may be."""
+    """Check the ends that follow from the fixed sum and the bounds of each weight."""
     settings = SCENES[name]
     result = laufruhe.solve(problem_of("mean mount force", TWINS, **settings))
     alone = laufruhe.solve(problem_of("mean mount force", [web("both", "2.8 kg", "200 mm")], **settings))
@@ -162,7 +162,7 @@ def test_unchecked_results_claim_no_free_decisions() -> None:
 
 
 def test_prices_within_the_accuracy_are_none() -> None:
-    """A slope that moves the objective by less than what is not proven has no price; one that is felt has."""
+    """Check that a slope below the gap of the proof has no price, and a larger one has."""
     problem = problem_of("mean mount force", [web("web")])
     design = evaluate_design(problem, [0.0])
     scale = design.value / 2.0

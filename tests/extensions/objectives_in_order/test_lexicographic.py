@@ -115,7 +115,7 @@ def test_equal_optima_are_named() -> None:
 
 @pytest.mark.slow
 def test_the_three_differ_as_the_chapter_says() -> None:
-    """The second "uses less metal than the first"; bearings feel the least with half of the weight on the crank."""
+    """Check "uses less metal than the first" of the second, and the least bearing load of half the weight."""
     roller, bob, counter = (solved(name).ranks for name in list(MACHINES)[:3])
     assert roller[1].final == pytest.approx(22.0, rel=1e-6)
     assert [bob[1].final, counter[1].final] == pytest.approx([14.0, 14.0], rel=1e-6)

@@ -315,7 +315,7 @@ class TestLimits:
             assert close_roll == pytest.approx(roll, abs=1e-6 * abs(force) * RADIUS)
 
     def test_equal_rods_on_one_pin_leave_a_rotating_force_alone(self, tmp_path: Path) -> None:
-        """n/2 m r w^2 that turns with the crank, as any book says; nothing else under the order n - 1."""
+        """Check n/2 m r w^2 that turns with the crank, and no other order below n - 1."""
         text = changed(TEXT, 'knuckle_radius = "50 mm"', 'knuckle_radius = "0 mm"')
         engine = loaded(tmp_path, text.split("[engine.rod]")[0] + text[text.index("[[operating") :]).engine
         loads = reciprocating_loads(engine, SPEED)

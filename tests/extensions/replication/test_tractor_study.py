@@ -204,7 +204,7 @@ class TestSeveralCylinders:
 
     @pytest.mark.parametrize("z", [2, 3, 4, 6])
     def test_optimal_webs_gain_little(self, worth: Worth, z: int) -> None:
-        """Half of the couple is what a crank can do in first order; higher orders and gas move the optimum by 2 %."""
+        """Check that a crank takes half of the couple of order 1, and that other loads move the optimum by 2 %."""
         for mounting in ("short", "long"):
             ratio = worth("fig-12", f"mean['{z} {mounting}, best'] / mean['{z} {mounting}']")
             assert 0.97 <= ratio <= 1.0 + 1e-4

@@ -73,7 +73,7 @@ def test_rods_turn_against_each_other() -> None:
 def test_equal_masses_and_weights_on_both_cranks_leave_no_load(
     mass: float, radius: float, offset: float, deficit: float, turning: float
 ) -> None:
-    """Meijer 1959: piston and displacer of one mass move their centre as the crank pins, whatever the rods."""
+    """Check Meijer 1959: equal masses of piston and displacer move their centre as the crank pins."""
     parts = halves(mass, mass, deficit, radius, 0.08, offset, turning)
     weights = tuple(
         Rotor(part.name, part.x, -(2.0 * mass + turning) * radius, part.shaft, Role.COUNTERWEIGHT) for part in parts

@@ -108,7 +108,7 @@ def test_an_open_thickness_is_the_mass_at_the_lever_of_the_shape() -> None:
 
 
 def test_every_part_that_the_smallest_body_overlaps_is_named() -> None:
-    """Bodies that overlap have no distance that would tell which one is nearer."""
+    """Check that all overlapping parts are named, because none of them has a distance."""
     text = READY.read_text(encoding="utf-8").replace(', spacing = "60 mm"', "")
     with pytest.raises(InputError, match=r"its clearance from (?=.*rod of cylinder 1).*piston of cylinder 1"):
         laufruhe.load(text.replace('"50 mm", "110 mm"', '"95 mm", "110 mm"'))
