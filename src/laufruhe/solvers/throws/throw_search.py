@@ -41,8 +41,8 @@ from laufruhe.solvers.throws.throw_windows import (
     windows_of,
 )
 
-Improve = Callable[[Candidate, bool], StarDesign | None]
-"""Function from a candidate to the local optimum near it (True) or to its own design (False); None if infeasible."""
+EvaluateCrank = Callable[[Candidate], StarDesign | None]
+"""Function from a candidate to its design; None if infeasible."""
 
 # largest number of boxes after the first box of every window
 MAX_BOXES = 1500
@@ -58,8 +58,6 @@ MAX_OF_ONE_ANGLE, COST_OF_ONE_ANGLE = 6144, 2e-5
 _FINER_FACTOR = 1.5
 # windows to try for a crank that the model can evaluate
 _MAX_REALISED = 50
-# boxes whose middle starts a local search: the first few, then every hundredth, and their largest number
-_SEARCHED_FIRST, _SEARCHED_EVERY, _MAX_SEARCHED = 2, 100, 5
 # spread up to which the middle of a box is evaluated as a design, and the largest number of such designs
 _SMALL_SPREAD, _MAX_EVALUATED = 1e-5, 12
 
@@ -170,7 +168,7 @@ class _Part(SearchPart):
 
 
 def search_throws(
-    problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, improve: Improve
+    problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, evaluate_crank: EvaluateCrank
 ) -> ThrowBound | None:
     """Return a lower bound of the objective over all throw angles, by branch and bound; None if nothing is proven.
 
@@ -180,8 +178,8 @@ def search_throws(
         Best known design; None if there is none.
     floor
         Known lower bound of the objective [SI].
-    improve
-        Local search or evaluation from a candidate.
+    evaluate_crank
+        Exact model of a crank.
     """
     zero_level = numerical_zero(problem)
     is_proven = best is not None and best.value - floor <= gap_tolerance_of(best.value, problem.tolerance, zero_level)
@@ -197,7 +195,7 @@ def search_throws(
     if not windows:
         return None if best is not None else ThrowBound(math.inf, None, 0, ())
     try:
-        search = ThrowSearch(problem, phasing, windows, improve, best)
+        search = ThrowSearch(problem, phasing, windows, evaluate_crank, best)
         for stage, _, _ in search.roots:
             # raises ModelError at once if memory does not suffice or loads have no finite response
             _ = stage.programs
@@ -212,11 +210,11 @@ class ThrowSearch(BoxSearch[_Part, StarDesign]):
     """Branch and bound search over firing windows and boxes of throws."""
 
     def __init__(
-        self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], improve: Improve,
+        self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], evaluate_crank: EvaluateCrank,
         best: StarDesign | None,
     ) -> None:  # fmt: skip
-        self._problem, self._phasing, self._improve = problem, phasing, improve
-        self._box_count = self._search_count = self._evaluation_count = 0
+        self._problem, self._phasing, self._evaluate_crank = problem, phasing, evaluate_crank
+        self._evaluation_count = 0
         self._best, self._violated = best, set[str]()
         self.what = "boxes of throws" + (" and angles" if any(phasing.is_geometry_open) else "")
         throws = phasing.layout(*phasing.minimum_geometry).throw_positions
@@ -369,18 +367,13 @@ class ThrowSearch(BoxSearch[_Part, StarDesign]):
         self._finest = stage
         if isinstance(box, FathomedPart):
             return box, None
-        self._box_count += 1
-        uses_search = self._search_count < _MAX_SEARCHED and (
-            self._box_count <= _SEARCHED_FIRST or self._box_count % _SEARCHED_EVERY == 0
-        )
         evaluates_middle = self._evaluation_count < _MAX_EVALUATED and float(box.spread.max()) < _SMALL_SPREAD
-        if uses_search or evaluates_middle:
-            self._search_count += uses_search
-            self._evaluation_count += not uses_search
+        if evaluates_middle:
+            self._evaluation_count += 1
             window = box.program.window
             candidate = replace(self.candidate(window, nearest_throws(window, box.middle)), left_out=left_out)
-            improved = self._improve(candidate, uses_search) if candidate.firing_order is not None else None
-            known = [design for design in (self._best, improved) if design is not None]
+            middle = self._evaluate_crank(candidate) if candidate.firing_order is not None else None
+            known = [design for design in (self._best, middle) if design is not None]
             self._best = min(known, key=self.rank, default=None)
-        best = self._best if uses_search or evaluates_middle else None
+        best = self._best if evaluates_middle else None
         return _Part(box.bound, box.is_exact, box, stage, left_out), best

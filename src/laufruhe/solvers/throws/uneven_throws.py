@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -140,16 +141,11 @@ def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None)
         if designs and len(shares) > 1:
             trade.append(_trade_point(problem, phasing, allowed, designs[0]))
     floor, source = _bound(problem, phasing, phasing.intervals)
-
-    def improve(candidate: Candidate, uses_search: bool) -> StarDesign | None:
-        if uses_search:
-            return local_optimum(phasing, candidate, phasing.intervals)
-        return evaluate_crank(phasing, candidate)
-
     box_bound = None
     # the degree of irregularity is no sum over cylinders
     if (not designs or phasing.thorough) and not has_degree(problem):
-        box_bound = search_throws(problem, phasing, designs[0] if designs else None, floor, improve)
+        best_design = designs[0] if designs else None
+        box_bound = search_throws(problem, phasing, best_design, floor, partial(evaluate_crank, phasing))
     if box_bound is not None:
         floor, source = max(floor, box_bound.bound), f"{box_bound.boxes} {box_bound.what}"
         if box_bound.best is not None and box_bound.best not in designs:
