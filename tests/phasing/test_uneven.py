@@ -140,7 +140,7 @@ def test_a_start_that_fires_too_unevenly_leads_to_a_crank_that_does_not(tmp_path
         Candidate(tuple(math.radians(a) for a in throws), (1, 3, 2)) for throws in ((0, 120, 240), (0, 100, 220))
     )
     assert not phasing.intervals.holds(phasing.problem_of(bent).engine.firing_intervals)
-    actual = local_optimum(phasing, bent, phasing.intervals, with_perturbations=False)
+    actual = local_optimum(phasing, bent, phasing.intervals)
     assert phasing.intervals.holds(actual.result.final.engine.firing_intervals, 1e-7)
     assert actual.value <= solve(replace(phasing.problem_of(even), phasing=None)).objective.value * (1.0 + 1e-6)
 

@@ -232,13 +232,10 @@ def _without_design(problem: Problem, phasing: Phasing, box_bound: ThrowBound | 
     )
 
 
-def local_optimum(
-    phasing: Phasing, start: Candidate, intervals: Intervals, with_perturbations: bool = True
-) -> StarDesign | None:  # fmt: skip
+def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> StarDesign | None:
     """Return the local optimum from a start crank, or that crank if it is no worse; None if neither is feasible.
 
-    If `with_perturbations` is True, it starts from perturbed cranks too, because a symmetric crank may be a saddle
-    point (S20).
+    It starts from perturbed cranks too, because a symmetric crank may be a saddle point (S20).
     """
     best = _if_feasible(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
@@ -262,7 +259,7 @@ def local_optimum(
             unit = max(best.value, SMALLEST_UNIT * best.result.objective.initial) or 1.0
         smooth = SmoothProgram(problem, unit, margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
         minimum_violation = math.inf
-        starts = _start_points(smooth, best)[: None if with_perturbations else 1]
+        starts = _start_points(smooth, best)
         for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, stop_when=run_all_starts):
             if not optimum.usable:
                 continue
