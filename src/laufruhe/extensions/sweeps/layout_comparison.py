@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
-from laufruhe.extension import object_at
+from laufruhe.extension import missing_extension, object_at
 from laufruhe.extensions.sweeps.swept import SweptPart
 from laufruhe.extensions.sweeps.swept_report import (
     MAX_ROWS,
@@ -25,6 +25,7 @@ from laufruhe.extensions.sweeps.swept_report import (
 )
 from laufruhe.files import fields as f
 from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
+from laufruhe.files.problem_file import EXTENSION_KEYS
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine.slider_crank import displacement
 from laufruhe.physics.torque import crank_torque
@@ -76,9 +77,8 @@ class LayoutComparison(SweptPart):
 
         Cylinders must have one size.
         """
-        if self.flywheel_for is not None:
-            # raise an error without the extension
-            object_at(_SWING)
+        if self.flywheel_for is not None and "flywheel" not in EXTENSION_KEYS:
+            raise problem_files.refused(self.cases[0], "study.flywheel_for", *missing_extension("flywheel"))
         points = super().points(problem_files)
         power = self.cases[0].equal_power_to
         odd = next((case for case in self.cases if case.equal_power_to != power), None)
