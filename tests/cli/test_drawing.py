@@ -26,7 +26,7 @@ def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPa
 
 def test_a_picture_does_not_depend_on_its_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compare pictures of an open crank drawn in this process and in two processes."""
-    result = solved("two-stroke-four-open")
+    result = solved("inline-five-open")
     here, there = (drawn(result, tmp_path / str(count), count, monkeypatch) for count in (0, 2))
     assert list(here) == list(there)
     assert here == there

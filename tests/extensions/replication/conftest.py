@@ -27,7 +27,15 @@ def study_of(file: str) -> StudyFile:
 
 @cache
 def parts_of(file: str) -> dict[str, Replication]:
-    return {part.name: part for part in study_of(file).study.parts}  # type: ignore[misc]
+    """Return the parts of a study; the largest sweep, which has as many points as all others, has a third of them."""
+    parts: dict[str, Replication] = {part.name: part for part in study_of(file).study.parts}  # type: ignore[misc]
+    if part := parts.get("reciprocating-mass"):
+        sweeps = [{**case.sweep} for case in part.cases]
+        for sweep in sweeps:
+            sweep.update({name: sweep[name].model_copy(update={"points": 15}) for name in sweep if name == "phi"})
+        cases = [case.model_copy(update={"sweep": sweep}) for case, sweep in zip(part.cases, sweeps, strict=True)]
+        parts[part.name] = part.model_copy(update={"cases": cases})
+    return parts
 
 
 def shared_part(file: str, name: str) -> Path:
