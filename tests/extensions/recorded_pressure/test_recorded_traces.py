@@ -22,7 +22,7 @@ from typer.testing import CliRunner, Result
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError, LaufruheError
-from laufruhe.extensions.flywheel.torque import TorqueFacts, torque_facts, torque_parts
+from laufruhe.extensions.flywheel.torque import TorqueFacts, torque_facts, torque_parts, turning_torque
 from laufruhe.extensions.recorded_pressure.gas import PressureTrace
 from laufruhe.files import number_tables
 from laufruhe.files.number_tables import Unit, number_table, unit_in
@@ -666,6 +666,25 @@ def test_a_record_of_a_point_has_keys_of_its_own(tmp_path: Path) -> None:
             with_points(tmp_path, f"{point}{wrong}\n")
 
 
+def with_drag(folder: Path, motored: Array, is_motored: bool) -> Problem:
+    """Return an engine with a recorded pressure of a fired and of a motored cylinder."""
+    rows = np.column_stack([DEGREES, P, motored])
+    np.savetxt(folder / "full.csv", rows, "%.6f", ";", header="angle [deg];fired [bar];drag [bar]", comments="")
+    text = f'title = "Recorded"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n{SINGLE}[gas]\nmodel = "trace"\n'
+    text += 'file = "full.csv"\nangle_zero = "firing"\npressure_column = 2\nmotored_column = 3\n'
+    path = folder / "motored.toml"
+    path.write_text(text + '[[operating_points]]\nspeed = "800 rpm"\n' + "motored = true\n" * is_motored)
+    return load(path)
+
+
+def test_a_motored_point_takes_the_torque_of_its_compression(tmp_path: Path) -> None:
+    compression = 1.0 + 20.0 * np.exp(-(np.radians(DEGREES) ** 2) / 0.1)
+    problems = [with_drag(tmp_path, compression, is_motored) for is_motored in (True, False)]
+    turning = [turning_torque(problem.engine, problem.points[0]) for problem in problems]
+    assert turning[0] == turning[1] is not None
+    assert turning[0].torque > 0.0
+
+
 @pytest.mark.parametrize("is_motored", [True, False])
 @pytest.mark.parametrize(("late", "is_doubted"), [(0.8, True), (-0.5, False)])
 def test_a_motored_pressure_peaks_before_dead_centre(
@@ -675,13 +694,7 @@ def test_a_motored_pressure_peaks_before_dead_centre(
     motored = 1.0 + 20.0 * np.exp(-((np.remainder(since + math.pi, 2.0 * math.pi) - math.pi) ** 2) / 0.1) * (
         np.abs(since) < 3.0
     )
-    rows = np.column_stack([DEGREES, P, motored])
-    np.savetxt(tmp_path / "full.csv", rows, "%.6f", ";", header="angle [deg];fired [bar];drag [bar]", comments="")
-    text = f'title = "Recorded"\n[engine]\nlayout = "inline"\ncycle = "four-stroke"\n{SINGLE}[gas]\nmodel = "trace"\n'
-    text += 'file = "full.csv"\nangle_zero = "firing"\npressure_column = 2\nmotored_column = 3\n'
-    path = tmp_path / "motored.toml"
-    path.write_text(text + '[[operating_points]]\nspeed = "800 rpm"\n' + "motored = true\n" * is_motored)
-    doubts = [str(doubt) for doubt in load(path).plausibility_warnings]
+    doubts = [str(doubt) for doubt in with_drag(tmp_path, motored, is_motored).plausibility_warnings]
     assert len(doubts) == is_doubted
     assert all(
         "motored pressure: has its peak 0.8 deg after dead centre; check angle_zero" in doubt for doubt in doubts
