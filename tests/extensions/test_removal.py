@@ -143,6 +143,7 @@ def test_other_additions_keep_their_order_without_an_extension(name: str, monkey
 def test_a_key_inside_a_table_names_its_extension(table: str, key: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(complaints, "is_installed", lambda _: False)
     tables = tomllib.loads((PROBLEMS / "compressor-set.toml").read_text(encoding="utf-8"))
+    tables = {name: entry for name, entry in tables.items() if name not in HOMES["keys"]}
     changed = tables[table][0] if isinstance(tables[table], list) else tables[table]
     changed[key] = []
     with pytest.raises(ValidationError) as error:
