@@ -30,7 +30,7 @@ from attack.plain_loads import (
 from attack.plain_loads import angles as angles_of
 from attack.plain_scene import Table, norm_and_channel, norm_at
 
-READ, STEPS = 1e-4, 16384
+READ, STEPS = 2e-4, 16384
 """Accuracy of values where gas bends between steps, and steps of a cycle."""
 VALVES = {"closed valves": "closed", "open valves": "open", "misfire": "moving"}
 LONGEST = 6
