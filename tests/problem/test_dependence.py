@@ -194,7 +194,7 @@ def test_no_engine_refutes_an_entry(rounds: int) -> None:
 def test_samples_of_one_engine_refute_most_stronger_claims() -> None:
     """Sample one engine: each stronger claim is refuted but of channels that are constant on it, and no entry is."""
     samples: dict[tuple[str, Kind, Dependence], list[list[np.ndarray]]] = {}
-    for _, channel, kind, claim, at in _entries([ALL_OPEN], 3):
+    for _, channel, kind, claim, at in _entries([ALL_OPEN], 6):
         assert not refuted(claim, at), (channel, kind)
         samples.setdefault((channel.name, kind, claim), []).append(at)
     survivors = {

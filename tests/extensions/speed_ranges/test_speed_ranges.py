@@ -343,7 +343,7 @@ def test_a_wrong_range_is_refused_in_one_line(more: str, tmp_path: Path) -> None
 
 
 def test_a_worst_value_needs_its_norm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("laufruhe.extensions.speed_ranges.file.extensions", lambda: ())
+    monkeypatch.setattr("laufruhe.extensions.speed_ranges.file.is_installed", lambda _: False)
     with pytest.raises(InputError, match="minimise: needs the extension 'worst_mean'"):
         laufruhe.load(written(tmp_path, "minimise = true\n"))
 
