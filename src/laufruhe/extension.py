@@ -182,6 +182,17 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
 }
 """Extensions of this package by the names that they add to tables, for the complaint if one is not installed."""
 INSTALL = "install laufruhe with all its folders"
+MOVED: Mapping[str, str] = {
+    name: f"{GROUP}.{module}:{name}"
+    for module, names in {
+        "bearing_loads.machine": ("Bearing",),
+        "chambers.gas": ("Chamber", "Chambers", "Compressor", "Pump", "Steam"),
+        "flywheel.machine": ("Arms", "Flywheel", "Rim"),
+        "recorded_pressure.gas": ("PressureTrace",),
+    }.items()
+    for name in names
+}
+"""Classes of `laufruhe.machine` up to release 0.3 that extensions have now, with their addresses."""
 
 
 def missing_extension(extension: str) -> tuple[str, str]:

@@ -6,13 +6,17 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from typing import ClassVar
 
 import pytest
 
-from laufruhe.errors import ModelError
-from laufruhe.extensions.bearing_loads.machine import Bearing
+import laufruhe.machine
+from laufruhe.errors import LaufruheWarning, ModelError
+from laufruhe.extension import MOVED
+from laufruhe.extensions.bearing_loads.machine import Bearing, MainBearings
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, Rotor, Shaft, SliderCrank
 from laufruhe.machine.dynamic import FluidTrack
+from laufruhe.machine.extra import Extra
 
 PART = SliderCrank("cylinder 1", 0.0, 0.06, 0.2, 1.0)
 OTHER = replace(PART, name="cylinder 2", x=0.1)
@@ -148,3 +152,26 @@ def test_a_bearing_rubs_by_friction_times_the_speed_of_its_journal(ratio: float)
     bearing = Bearing("1", 0.0, diameter=0.07, width=0.03, friction=0.012, shaft=Shaft("s", ratio))
     speed, force = 300.0, 5000.0
     assert bearing.drag * force * speed == pytest.approx(0.012 * force * 0.035 * abs(ratio) * speed)
+
+
+class Steady(Extra):
+    """A part of a package that supports the crankshaft in one place."""
+
+    supports: ClassVar = {"crankshaft": [5.0], "second": [2.0]}
+
+
+def test_parts_that_support_one_shaft_add_up() -> None:
+    bearings = MainBearings((Bearing("1", 0.0), Bearing("2", 1.0)))
+    engine = Engine("one", Cycle.FOUR_STROKE, (PART,), extras=(bearings, Steady()))
+    assert engine.supports == {"crankshaft": [0.0, 1.0, 5.0], "second": [2.0]}
+
+
+def test_bearings_have_names_of_their_own() -> None:
+    with pytest.raises(ModelError, match="two bearings are called '1'; give each its own name"):
+        MainBearings((Bearing("1", 0.0), Bearing("1", 1.0)))
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_classes_that_extensions_have_now_are_found_with_a_warning(name: str) -> None:
+    with pytest.warns(LaufruheWarning, match=f"laufruhe.machine.{name} is now laufruhe.extensions"):
+        assert getattr(laufruhe.machine, name).__name__ == name

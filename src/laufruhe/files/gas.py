@@ -162,7 +162,7 @@ def gas_of(table: GasTable | None, context: GasContext) -> GasModel | None:
         common, single = table.read(context)
         for model in GAS_MODELS.values() if table.acts_on_bore else ():
             others = model.read_single(table, context)
-            for name in others.keys() & single.keys():
+            for name in sorted(others.keys() & single.keys()):
                 raise Refused("gas", name, "has gas of its own twice", "name each cylinder at most once")
             single = {**others, **single}
     gas: GasModel = CylinderGases(common, tuple(single.items())) if single else common

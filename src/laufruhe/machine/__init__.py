@@ -1,5 +1,10 @@
 """The engine: slider-cranks and rotors on a block on mounts, in SI units (C1)."""
 
+import warnings
+from typing import TYPE_CHECKING
+
+from laufruhe.errors import LaufruheWarning
+from laufruhe.extension import MOVED, object_at
 from laufruhe.machine.block import Block
 from laufruhe.machine.bodies import Rod
 from laufruhe.machine.engine import Cycle, Engine, OperatingPoint
@@ -32,3 +37,12 @@ __all__ = [
     "TrappedCharge",
     "Wiebe",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> type:
+        """Return a class that an extension has now; warn about its new place."""
+        if name not in MOVED:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        warnings.warn(f"laufruhe.machine.{name} is now {MOVED[name].replace(':', '.')}", LaufruheWarning, stacklevel=2)
+        return object_at(MOVED[name])

@@ -152,7 +152,11 @@ class Engine:
     @property
     def supports(self) -> Mapping[str, Sequence[float]]:
         """Positions along x at which parts of extensions support its shafts [m], in order, by the name of the shaft."""
-        return {shaft: places for one in self.extras for shaft, places in one.supports.items()}
+        places: dict[str, set[float]] = {}
+        for one in self.extras:
+            for shaft, at in one.supports.items():
+                places.setdefault(shaft, set()).update(at)
+        return {shaft: sorted(at) for shaft, at in places.items()}
 
     @property
     def turning_inertia(self) -> float | None:

@@ -93,7 +93,8 @@ class Measure(MeasureQuery):
         These are norms of loads with gas, run-ups, and numbers computed from loads or the torque.
         """
         channel = self.channel
-        return channel.depends_on_gas or bool(channel.simulation) or (channel.is_number and channel.depends_on_loads)
+        depends_on_loads = channel.depends_on_torque or (channel.is_number and channel.depends_on_loads)
+        return channel.depends_on_gas or bool(channel.simulation) or depends_on_loads
 
     @property
     def depends_on_loads(self) -> bool:

@@ -244,8 +244,12 @@ class Problem(Goals, Statements):
 
     @property
     def plausibility_warnings(self) -> tuple[Complaint, ...]:
-        """Warnings about the file and about unusual numbers, which stop nothing."""
-        return (*self.warnings, *(warning for advice in ADVICE.values() for warning in advice.about_problem(self)))
+        """Warnings about the file and about unusual numbers, the first for each place, which stop nothing."""
+        first: dict[str, Complaint] = {}
+        for advice in ADVICE.values():
+            for warning in advice.about_problem(self):
+                first.setdefault(warning.where, warning)
+        return (*self.warnings, *first.values())
 
     @property
     def unbalances(self) -> tuple[Decision, ...]:

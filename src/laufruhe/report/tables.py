@@ -113,9 +113,6 @@ def _degrees(angles: Iterable[float]) -> str:
     return " ".join(f"{math.degrees(angle):.6g}" for angle in angles)
 
 
-"""Number of directions of the wear table."""
-
-
 def _orders(result: Result) -> Table:
     designs = designs_with_loads(result)
     table = Table.from_fields(orders_with_phases(designs))

@@ -7,6 +7,7 @@ import json
 import math
 import random
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -694,8 +695,10 @@ def test_a_motored_pressure_peaks_before_dead_centre(
     motored = 1.0 + 20.0 * np.exp(-((np.remainder(since + math.pi, 2.0 * math.pi) - math.pi) ** 2) / 0.1) * (
         np.abs(since) < 3.0
     )
-    doubts = [str(doubt) for doubt in with_drag(tmp_path, motored, is_motored).plausibility_warnings]
-    assert len(doubts) == is_doubted
+    problem = with_drag(tmp_path, motored, is_motored)
+    points = (*problem.points, replace(problem.points[0], name="second"))
+    doubts = [str(doubt) for doubt in replace(problem, points=points).plausibility_warnings]
+    assert len(doubts) == is_doubted, "one warning for all operating points"
     assert all(
         "motored pressure: has its peak 0.8 deg after dead centre; check angle_zero" in doubt for doubt in doubts
     )

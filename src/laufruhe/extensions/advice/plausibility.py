@@ -43,22 +43,21 @@ MAX_REST = 0.02
 _ROUNDING = 1e-6
 
 
-def _warnings(problem: Problem) -> tuple[Complaint, ...]:
-    """Return warnings about unusual numbers of a problem, such as a rod ratio above 0.5, one for each part."""
+def _warnings(problem: Problem) -> list[Complaint]:
+    """Return warnings about unusual numbers of a problem, such as a rod ratio above 0.5."""
     engine, points = problem.engine, problem.points
     drives = (drive for decision in problem.decisions for drive in decision.drives)
     # the start of an open mass may be any
     open_masses = {drive.key[0] for drive in drives if isinstance(drive, NumberDrive) and drive.kind is Kind.PISTON}
-    warnings = [*_of_speed(engine, points), *_of_pistons(engine, open_masses), *_of_rotors(engine), *_of_mounts(engine)]
-    warnings += [
+    return [
+        *_of_speed(engine, points),
+        *_of_pistons(engine, open_masses),
+        *_of_rotors(engine),
+        *_of_mounts(engine),
         *([] if problem.fires_together or problem.phasing is not None else _of_firing(engine)),
         *_of_gas(engine, points),
         *_of_machines(engine, points),
     ]
-    first: dict[str, Complaint] = {}
-    for warning in warnings:
-        first.setdefault(warning.where, warning)
-    return tuple(first.values())
 
 
 def _of_speed(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
@@ -146,6 +145,7 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
             yield Complaint(
                 "least pressure of the gas", lowest, rule, "check gauge and peg; pressures must be absolute"
             )
+        # nothing burns: a motored gas is its own motored gas
         if gas.motored(engine.cycle) is gas:
             continue
         lies_late = abs(facts.peak_angle) > LATEST_PEAK and facts.peak_pressure > 2.0 * abs(facts.least_pressure)

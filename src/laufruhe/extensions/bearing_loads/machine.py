@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -61,6 +62,11 @@ class MainBearings(Extra):
 
     name: ClassVar[str] = "main_bearings"
     bearings: tuple[Bearing, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [bearing.name for bearing in self.bearings]
+        if (double := next((name for name, count in Counter(names).items() if count > 1), None)) is not None:
+            raise ModelError(f"two bearings are called '{double}'; give each its own name")
 
     @property
     def supports(self) -> Mapping[str, Sequence[float]]:

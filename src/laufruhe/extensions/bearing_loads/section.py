@@ -17,6 +17,7 @@ from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
 
 DIRECTIONS = 180
+"""Number of directions of the wear table."""
 
 
 def has_bearings(result: Result) -> bool:

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.gas.base import AMBIENT_PRESSURE, GasModel, OneChamber, check_pressures
 from laufruhe.machine.gas.charge import JUMP_WIDTH, dead_centres, swept_volume
@@ -233,7 +233,7 @@ class Chambers(GasModel):
     def pressure(self, part: SliderCrank, _cycle: Cycle, angles: Array, /) -> Array:
         """Return the pressure of the only chamber of a rod [Pa]."""
         if len(chambers := self.of(part)) != 1:
-            raise ModelError(f"{part.name} has several chambers, which have a pressure each")
+            raise ModelError(f"{part.name} has {counted(len(chambers), 'chamber')}; one pressure needs one chamber")
         return chambers[0].pressure(part, angles)
 
     def thrust(self, part: SliderCrank, _cycle: Cycle, angles: Array, /) -> Array:
