@@ -35,7 +35,7 @@ class Extension:
     name
         Name of the package in messages.
     needs
-        Names of all extensions whose modules its own import; it is left out without them.
+        Names of the extensions that its modules import. Without one of them it is left out.
     norms
         Subclasses of `laufruhe.numerics.norms.Norm`.
     channels

@@ -56,6 +56,7 @@ DRAWN = [(family, seed) for family, seeds in SEEDS.items() for seed in seeds]
 def test_no_claim_falls(family: str, seed: int) -> None:
     verdict = attacked(family, seed, 2)
     assert verdict.wrong == [], f"{family} {seed}"
+    assert verdict.status != "refused", f"{family} {seed}: {verdict.notes}"
 
 
 @pytest.fixture(scope="module")

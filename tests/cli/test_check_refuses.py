@@ -16,7 +16,7 @@ from problem_files import PROBLEMS, READY, changed
 
 HEIGHTS = (PROBLEMS / "tractor-four-shaft-heights.toml").read_text()
 REFUSED = {
-    "flywheel is open, but no objective or limit": changed(
+    "flywheel.inertia is open, but no objective or limit": changed(
         HEIGHTS, "[objective]", '[flywheel]\ninertia = { between = ["1 kg m^2", "2 kg m^2"] }\n[objective]'
     ),
 }

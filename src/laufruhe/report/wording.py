@@ -230,9 +230,15 @@ def explained(result: Result) -> str:
     gap = f"a gap of {share(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
     # a large residual, as of a length at zero, says nothing beside a proof
     conditions = f", and {_conditions(c.kkt_residual)}" if c.kkt_residual <= LARGE_RESIDUAL else ""
+    proven = f"{gap} (proof: {c.kind})"
+    design = f"this one has {figure(o.value, o.unit, 6)}"
+    optimum = result.ranks[0].minimum if result.ranks else o.value
+    if o.value - optimum > NO_CHANGE * max(o.value, o.initial):
+        design = f"the least found is {figure(optimum, o.unit, 6)}, {proven}; {design}, as `within` allows"
+    else:
+        design = f"{design}, {proven}"
     return (
-        f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; "
-        f"this one has {figure(o.value, o.unit, 6)}, {gap} (proof: {c.kind}). "
+        f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; {design}. "
         f"The bound was not taken from the solver but computed from the exact model ({c.method}){conditions}."
     )
 

@@ -252,9 +252,9 @@ def refuse(problem: Problem, ranks: Sequence[PriorityLevel] = ()) -> None:
         )
     for kind in sorted(kind for kind in kinds if kind.is_alone):
         if not any(depends(measure.channel, {kind}, problem) for measure in problem.measures):
+            names = " and ".join(decision.name for decision in problem.decisions if decision.kind is kind)
             raise ModelError(
-                f"{kind.name} is open, but no objective or limit depends on it; fix it, or add a measure of it to the "
-                "objective"
+                f"{names} is open, but no objective or limit depends on it; fix it, or add a measure that depends on it"
             )
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))

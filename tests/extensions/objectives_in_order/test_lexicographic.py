@@ -21,6 +21,7 @@ from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.sections import tables_of
+from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from problem_files import changed, loaded
@@ -169,6 +170,9 @@ def test_the_second_objective_may_cost_a_share_of_the_first(tmp_path: Path) -> N
     minimum = masses[shaken <= 1.02 * shaken.min()].min()
     assert result.ranks[1].final == pytest.approx(minimum, abs=0.004)
     assert result.ranks[0].final == pytest.approx(1.02 * result.ranks[0].minimum, rel=1e-5)
+    least, value = (f"{number:.6g} N" for number in (result.ranks[0].minimum, result.objective.value))
+    assert f"the least found is {least}, a gap of" in explained(result)
+    assert f"this one has {value}, as `within` allows" in explained(result)
     # the allowed loss of the first objective is no gap of the proof
     assert result.certificate.gap == max(rank.gap for rank in result.ranks)
     assert result.certificate.kind is result.ranks[0].proof is result.ranks[1].proof is Proof.GLOBAL

@@ -36,19 +36,28 @@ from laufruhe.solvers.throws.throw_starts import why_none_fires
 from laufruhe.solvers.values import ObjectiveValue
 
 
-def alike_measures(problem: Problem) -> list[Measure]:
-    """Return the measures that are numbers and equal for all even stars of equal cylinders (S35).
+def torque_numbers(problem: Problem) -> list[Measure]:
+    """Return the numbers of the crank's torque that depend on no open number but the star.
 
-    They depend on no other open number.
+    All even stars of equal cylinders have the same dead centres, and so the same torque (S35). Other numbers, such as
+    the heat of an absorber, depend on the places of the throws too.
     """
     others = open_kinds(problem) - {Kind.STAR}
     return [
         measure
         for measure in problem.measures
         if measure.channel.is_number
-        and dependence(measure.channel, Kind.STAR, problem) in (Dependence.NONE, Dependence.SWING)
+        and measure.channel.depends_on_torque
+        and dependence(measure.channel, Kind.STAR, problem) is Dependence.SWING
         and not depends(measure.channel, others, problem)
     ]
+
+
+def alike_measures(problem: Problem) -> list[Measure]:
+    """Return the numbers that are equal for all even stars of equal cylinders: those of torque, and constants."""
+    kinds = open_kinds(problem) | {Kind.STAR}
+    constants = [m for m in problem.measures if m.channel.is_number and not depends(m.channel, kinds, problem)]
+    return [*torque_numbers(problem), *constants]
 
 
 def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Problem], Result]) -> Result:
@@ -147,8 +156,8 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
     phasing = problem.phasing
     if phasing is None:
         raise SolverError("the problem has no open phasing")
-    has_alike = bool(alike_measures(problem))
-    if phasing.throws is None and has_alike and not phasing.continuous and problem.cylinders_are_alike:
+    has_torque = bool(torque_numbers(problem))
+    if phasing.throws is None and has_torque and not phasing.continuous and problem.cylinders_are_alike:
         return solve_alike_stars(problem, phasing, partial(solve_phasing, search=search))
     started = time.perf_counter()
     if phasing.throws is not None:
@@ -162,15 +171,15 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
 
 def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
-    has_alike = bool(alike_measures(problem))
-    if has_alike and problem.cylinders_are_alike:
+    has_torque = bool(torque_numbers(problem))
+    if has_torque and problem.cylinders_are_alike:
         even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
         solve = partial(solve_phasing, search=search)
         result = solve_alike_stars(problem, even, solve) if is_even and families_of(even)[0] else None
         return _solve_uneven(problem, phasing, None if result is None or result.objective is None else result)
     is_resolved = any(measure.is_cylinder_resolved for measure in problem.measures)
     solves_each = problem.depends_on_firing_order and (phasing.shares_throws or is_resolved)
-    if is_even and (has_alike or solves_each):
+    if is_even and (has_torque or solves_each):
         stars = even_stars(phasing)
         result = solve_every_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
         if not phasing.continuous:
