@@ -1,1 +1,1 @@
-"""Solve for decisions without a convex program by branch and bound: positions, phase leads, sizes."""
+"""Search of open numbers without a convex program over boxes, which extensions share."""
