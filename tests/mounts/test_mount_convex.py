@@ -29,6 +29,7 @@ def test_the_studys_sag_comes_out_and_is_proven(name, order, printed):
     result = solve_mounts(load(PROBLEMS / f"study-soft-mounts{name}.toml"))
     assert result.status is Status.OPTIMAL
     assert result.certificate.kind is Proof.GLOBAL
+    assert result.certificate.kkt_residual < 1e-6
     assert result.objective.value == pytest.approx(sag_for_critical_speed(400.0 * RPM, order), rel=2e-5)
     assert result.objective.value == pytest.approx(printed, abs=0.05e-3)
     (limit,) = result.limits

@@ -111,7 +111,9 @@ def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
     values = [1.0, 0.02j]
     x = np.concatenate([domain.columns_of(u) for domain, u in zip(domains_of(problem.decisions), values, strict=True)])
     point, worst = problem.points[0], rows.worst(measure, x)
-    up, down = runs_of(problem.design(values), point, problem.fidelity, problem.engine.extra(Run))
+    run = problem.engine.extra(Run)
+    up, down = runs_of(problem.design(values), point, problem.fidelity, run)
+    assert (up.speeds[-1], down.speeds[-1]) == (run.speed, 0.0)
     assert worst == pytest.approx(max(up.travel.max(), down.travel.max()), rel=1e-9)
     mounts = tables_of(READY)["mounts"]
     stop = {"gap": "1 mm", "stiffness": "500 N/mm"}
