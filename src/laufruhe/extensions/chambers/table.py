@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
@@ -14,10 +15,20 @@ from laufruhe.files.complaints import Refused, errors_at_key, require_distinct
 from laufruhe.files.fields import Table
 from laufruhe.files.gas import GasContext, GasTable, names_of_cylinders
 from laufruhe.machine import Cycle, GasModel
-from laufruhe.machine.gas.base import AMBIENT_PRESSURE
+from laufruhe.machine.gas.base import AMBIENT_PRESSURE, OneChamber
 
 
-class SteamTable(Table):
+class DiagramTable(Table):
+    """Pressure of a chamber over one turn."""
+
+    makes: ClassVar[type[Steam | OneChamber]]
+
+    def of_chamber(self, _folder: Path, _where: str, _air: float, /) -> Steam | OneChamber:
+        """Return the pressure; `air` is that around [Pa], and `folder` has the files that keys at `where` name."""
+        return self.makes(**self.model_dump())
+
+
+class SteamTable(DiagramTable):
     """An indicator diagram of straight lines and hyperbolas, its points parts of the stroke."""
 
     makes: ClassVar = Steam
@@ -35,7 +46,7 @@ class SteamTable(Table):
     exponent: f.Positive = f.optional("Exponent of expansion and compression; 1, a hyperbola, by default.", 1.0)
 
 
-class PumpTable(Table):
+class PumpTable(DiagramTable):
     """A piston pump."""
 
     makes: ClassVar = Pump
@@ -43,7 +54,7 @@ class PumpTable(Table):
     delivery: f.PositivePressure
 
 
-class CompressorTable(Table):
+class CompressorTable(DiagramTable):
     """A piston compressor of gas with ideal valves."""
 
     makes: ClassVar = Compressor
@@ -142,10 +153,6 @@ def _chamber(table: ChamberTable, k: int, context: GasContext, air: float) -> Ch
     numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
     names = tuple(names_of_cylinders(numbers, parts, f"{where}.cylinders"))
     with errors_at_key(f"{where}.{key}"):
-        model = (
-            diagram.of_chamber(context.folder, f"{where}.trace", air)
-            if key == "trace"
-            else diagram.makes(**diagram.model_dump())
-        )
+        model = diagram.of_chamber(context.folder, f"{where}.{key}", air)
     with errors_at_key(f"{where}.rod"):
         return Chamber(table.name or f"chamber {k}", names, table.end, table.bore, table.rod, model)
