@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copyreg
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from numbers import Integral
@@ -145,6 +146,13 @@ def refused(where: str, value: str, rule: str, remedy: str, source: object = "la
 def wrong_call(where: str, argument: object, rule: str, remedy: str) -> InputError:
     """Return an `InputError` about a wrong argument of a Python call."""
     return refused(where, printed(repr(argument), 60), rule, remedy)
+
+
+def check_names(kind: str, names: Iterable[str]) -> None:
+    """Raise `ModelError` if two parts of a kind, a noun in the plural, have one name."""
+    double = next((name for name, count in Counter(names).items() if count > 1), None)
+    if double is not None:
+        raise ModelError(f"two {kind} are called '{double}'; give each its own name")
 
 
 def check_integer(where: str, argument: object, lower: int, upper: float = math.inf) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -12,7 +11,7 @@ from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, TypeVar
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, check_names
 from laufruhe.machine.block import Block, LoadCase
 from laufruhe.machine.extra import Extra, MachineTorque
 from laufruhe.machine.facing import with_shared_chambers
@@ -118,10 +117,7 @@ class Engine:
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "geared"):
-            names = [part.name for part in getattr(self, kind)]
-            if len(set(names)) < len(names):
-                double = next(name for name, count in Counter(names).items() if count > 1)
-                raise ModelError(f"two {kind.replace('_', '-')} are called '{double}'; give each its own name")
+            check_names(kind.replace("_", "-"), [part.name for part in getattr(self, kind)])
         places: dict[object, str] = {}
         for part in self.slider_cranks:
             place = (part.shaft.y, part.shaft.z, part.x, direction(part.bank))

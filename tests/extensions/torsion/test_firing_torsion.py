@@ -35,6 +35,12 @@ def problem_of(whole: dict[str, Any]) -> Problem:
     return load_tables(whole, Path("five.toml"))
 
 
+def damped() -> dict[str, Any]:
+    """Return the torsion of the crankshaft with a viscous damper on its pulley."""
+    damper = {"name": "damper", "on": "pulley", "inertia": "0.01 kg m^2", "damping": "2 N m s/rad"}
+    return tables()["torsion"] | {"absorbers": [damper]}
+
+
 def fired(whole: dict[str, Any], order: tuple[int, ...]) -> Problem:
     """Return the problem with a firing order and the throws that it makes even."""
     engine = {key: value for key, value in whole["engine"].items() if key not in ("throws", "cylinders")}
@@ -258,8 +264,7 @@ def test_banks_that_share_throws_are_decided_order_by_order() -> None:
 
 def test_heat_of_an_absorber_depends_on_the_firing_order() -> None:
     """Compare the best order under a limit of heat with each firing order by itself; no order keeps a tiny limit."""
-    damper = {"name": "damper", "on": "pulley", "inertia": "0.01 kg m^2", "damping": "2 N m s/rad"}
-    torsion = tables()["torsion"] | {"absorbers": [damper]}
+    torsion = damped()
     limit, few = {"limit": "absorber heat", "max": "1 MW"}, {"samples": 60}
     problems = [fired(tables(torsion=torsion, fidelity=few, constraints=[limit]), order) for order in orders_of(5)]
     evaluations = [evaluate(problem) for problem in problems]
@@ -288,7 +293,6 @@ def test_only_numbers_of_the_torque_are_equal_for_even_stars() -> None:
         {"limit": "piston travel", "max": "1 m"},
         {"limit": "degree of irregularity", "max": 1.0},
     ]
-    damper = {"name": "damper", "on": "pulley", "inertia": "0.01 kg m^2", "damping": "2 N m s/rad"}
-    problem = problem_of(tables(torsion=tables()["torsion"] | {"absorbers": [damper]}, constraints=limits))
+    problem = problem_of(tables(torsion=damped(), constraints=limits))
     assert [measure.channel.name for measure in torque_numbers(problem)] == ["degree of irregularity"]
     assert {m.channel.name for m in alike_measures(problem)} == {"degree of irregularity", "piston travel"}

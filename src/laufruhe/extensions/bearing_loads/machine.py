@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, check_names
 from laufruhe.machine import CRANKSHAFT, Engine, Shaft
 from laufruhe.machine.extra import Extra
 
@@ -64,9 +63,7 @@ class MainBearings(Extra):
     bearings: tuple[Bearing, ...] = ()
 
     def __post_init__(self) -> None:
-        names = [bearing.name for bearing in self.bearings]
-        if (double := next((name for name, count in Counter(names).items() if count > 1), None)) is not None:
-            raise ModelError(f"two bearings are called '{double}'; give each its own name")
+        check_names("bearings", self.labels)
 
     @property
     def supports(self) -> Mapping[str, Sequence[float]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, check_names
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.extra import Extra
 from laufruhe.numerics.arrays import Array, Mask
@@ -199,10 +198,7 @@ class Torsion(Extra):
     name: ClassVar[str] = TORSION.name
 
     def __post_init__(self) -> None:
-        names = [disc.name for disc in self.discs] + [absorber.name for absorber in self.absorbers]
-        double = next((name for name, count in Counter(names).items() if count > 1), None)
-        if double is not None:
-            raise ModelError(f"two discs are called '{double}'; give each its own name")
+        check_names("discs", [disc.name for disc in self.discs] + [absorber.name for absorber in self.absorbers])
         if len(self.discs) < 2 or len(self.sections) != len(self.discs) - 1:
             raise ModelError("a shaft that twists needs two discs at least, and a section from each to the next")
         if self.parents and (
